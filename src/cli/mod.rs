@@ -1,0 +1,61 @@
+//! Words on a command line -> calls into the library; the only code that prints or exits.
+//! Not for: anything that computes. Read first: `render.rs`, the program's table of contents.
+
+mod check;
+mod diff;
+mod eval;
+mod materials;
+mod profile;
+mod render;
+
+use clap::{Parser, Subcommand};
+use marmor::{ErrorKind, Result};
+use std::process::ExitCode;
+
+#[derive(Parser)]
+#[command(name = "marmor", version, about, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Render a scene to EXR and PNG
+    Render(render::Args),
+    /// Say what is in a scene, what will be built and what is left out
+    Check(check::Args),
+    /// Compare two pictures: RMSE and relative error with 95 % intervals
+    Diff(diff::Args),
+    /// Print or plot M(r) of one or more models of a material
+    Profile(profile::Args),
+    /// Evaluate S_d for rows of a CSV on standard input
+    Eval(eval::Args),
+    /// List the catalogue of measured media
+    Materials(materials::Args),
+}
+
+/// Exit code of a render that was interrupted and wrote what it had.
+pub const INTERRUPTED: u8 = 75;
+
+/// Runs the command of this process's arguments.
+pub fn main() -> ExitCode {
+    let outcome: Result<ExitCode> = match Cli::parse().command {
+        Command::Render(args) => render::run(args),
+        Command::Check(args) => check::run(args),
+        Command::Diff(args) => diff::run(args),
+        Command::Profile(args) => profile::run(args),
+        Command::Eval(args) => eval::run(args),
+        Command::Materials(args) => materials::run(args),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("marmor: {error}");
+        ExitCode::from(match error.kind() {
+            ErrorKind::Usage => 2,
+            ErrorKind::Scene => 3,
+            ErrorKind::File => 4,
+            ErrorKind::Numeric => 5,
+            ErrorKind::Memory => 6,
+        })
+    })
+}

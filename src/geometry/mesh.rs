@@ -1,0 +1,116 @@
+//! A mesh of triangles, and the point of a surface that a ray or a sampler found.
+
+use crate::math::{DVec3, Vec3};
+
+/// Triangles over shared vertices, in world space relative to the scene's centre.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Vertex positions [unit].
+    pub positions: Vec<Vec3>,
+    /// Indices into `positions`, three a triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Shading normals; `None` shades with the triangles' own.
+    pub normals: Option<Normals>,
+}
+
+/// Shading normals with indices of their own, as OBJ has them.
+#[derive(Clone, Debug, Default)]
+pub struct Normals {
+    /// Unit vectors.
+    pub vectors: Vec<Vec3>,
+    /// Indices into `vectors`, one triple for each triangle of the mesh.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// A point on a triangle, with what every reader of a surface needs.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfacePoint {
+    /// Position [unit].
+    pub x: Vec3,
+    /// Unit normal of the triangle, outward.
+    pub n_geometric: Vec3,
+    /// Unit normal for shading, in the same half space as `n_geometric`.
+    pub n: Vec3,
+    /// Bound of the rounding error of `x` and of a ray test against the triangle [unit].
+    pub error: f32,
+}
+
+/// A ray that leaves the surface starts this many units in the last place of the triangle's largest
+/// coordinate away from it: interpolation and the intersection test each lose a few.
+const ERROR_ULPS: f32 = 32.0 * f32::EPSILON;
+
+impl Mesh {
+    /// The three corners of a triangle [unit].
+    #[inline]
+    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+        self.triangles[triangle as usize].map(|i| self.positions[i as usize])
+    }
+
+    /// (b - a) x (c - a) in f64, so that neither needles nor scales of 1e-6 or 1e6 lose it [unit²].
+    #[inline]
+    pub fn scaled_normal(&self, triangle: u32) -> DVec3 {
+        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+        (b - a).cross(c - a)
+    }
+
+    /// Area of a triangle [unit²].
+    pub fn area(&self, triangle: u32) -> f64 {
+        0.5 * self.scaled_normal(triangle).length()
+    }
+
+    /// Unit outward normal of a triangle; zero for a triangle without area.
+    #[inline]
+    pub fn geometric_normal(&self, triangle: u32) -> Vec3 {
+        self.scaled_normal(triangle).normalize_or_zero().as_vec3()
+    }
+
+    /// The point a + u (b - a) + v (c - a) of a triangle.
+    #[inline]
+    pub fn point(&self, triangle: u32, u: f32, v: f32) -> SurfacePoint {
+        let [a, b, c] = self.corners(triangle);
+        let n_geometric = self.geometric_normal(triangle);
+        let largest = a.abs().max(b.abs()).max(c.abs()).max_element();
+        SurfacePoint {
+            x: a * (1.0 - u - v) + b * u + c * v,
+            n_geometric,
+            n: self.shading_normal(triangle, u, v, n_geometric),
+            error: ERROR_ULPS * largest,
+        }
+    }
+
+    /// Interpolated normal, kept on the side of `n_geometric`; the geometric one where there is none or
+    /// where the file's normals cancel.
+    fn shading_normal(&self, triangle: u32, u: f32, v: f32, n_geometric: Vec3) -> Vec3 {
+        let Some(normals) = &self.normals else { return n_geometric };
+        let [a, b, c] = normals.triangles[triangle as usize].map(|i| normals.vectors[i as usize]);
+        let n = (a * (1.0 - u - v) + b * u + c * v).normalize_or(n_geometric);
+        if n.dot(n_geometric) < 0.0 { -n } else { n }
+    }
+
+    /// Smallest and largest corner of the box around all vertices [unit]; `None` without vertices.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        let first = *self.positions.first()?;
+        Some(self.positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p))))
+    }
+}
+
+impl SurfacePoint {
+    /// The same point seen from the side that `direction` leaves to: normals turned into its half space.
+    #[inline]
+    #[must_use]
+    pub fn facing(mut self, direction: Vec3) -> Self {
+        if self.n_geometric.dot(direction) < 0.0 {
+            self.n_geometric = -self.n_geometric;
+            self.n = -self.n;
+        }
+        self
+    }
+
+    /// Where a ray into `direction` starts so that it cannot meet the surface it leaves: moved along the
+    /// geometric normal, to the side of `direction`, by the bound of the error. Scales with the scene.
+    #[inline]
+    pub fn leave(&self, direction: Vec3) -> Vec3 {
+        let offset = self.n_geometric * self.error;
+        if self.n_geometric.dot(direction) < 0.0 { self.x - offset } else { self.x + offset }
+    }
+}

@@ -1,0 +1,12 @@
+//! Triangle meshes and points on them. Not for: materials, rays (`query`).
+//! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area.
+
+mod area_table;
+mod mesh;
+mod morton;
+mod obj;
+
+pub use area_table::{AreaSample, AreaTable};
+pub use mesh::{Mesh, Normals, SurfacePoint};
+pub use morton::morton_code;
+pub use obj::load_obj;

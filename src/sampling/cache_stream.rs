@@ -1,0 +1,140 @@
+//! The long stream behind the sample cache.
+
+use crate::math::{hash_combine, unit_f32, unit_f64};
+
+/// Dimensions of the stream.
+pub const DIMENSIONS: usize = 8;
+
+/// One Owen-scrambled Sobol sequence [Burley 2020] of 2^32 points, continued across passes and never restarted:
+/// on a Morton-ordered area table it has 3 to 10 times less noise than independent points. Ours because
+/// `sobol_burley` ends at 2^16 points.
+#[derive(Clone, Debug)]
+pub struct CacheStream {
+    vectors: [[u32; 32]; DIMENSIONS],
+    scramble: [u32; DIMENSIONS],
+}
+
+/// Primitive polynomial (degree, inner coefficients) and first direction numbers of dimensions 2.. [Joe, Kuo 2008].
+const JOE_KUO: [(usize, u32, &[u32]); DIMENSIONS - 1] = [
+    (1, 0, &[1]),
+    (2, 1, &[1, 3]),
+    (3, 1, &[1, 3, 1]),
+    (3, 2, &[1, 1, 1]),
+    (4, 1, &[1, 1, 3, 3]),
+    (4, 4, &[1, 3, 5, 13]),
+    (5, 2, &[1, 1, 5, 5, 17]),
+];
+
+impl CacheStream {
+    /// The stream of one object: `seed` of the render, `object` so that two objects do not share points.
+    pub fn new(seed: u64, object: u64) -> Self {
+        let mut vectors = [[0; 32]; DIMENSIONS];
+        vectors[0] = std::array::from_fn(|bit| 1 << (31 - bit));
+        for (v, (degree, inner, first)) in vectors[1..].iter_mut().zip(JOE_KUO) {
+            for bit in 0..32 {
+                v[bit] = if bit < degree {
+                    first[bit] << (31 - bit)
+                } else {
+                    let mut value = v[bit - degree] ^ (v[bit - degree] >> degree);
+                    for k in 1..degree {
+                        if inner >> (degree - 1 - k) & 1 == 1 {
+                            value ^= v[bit - k];
+                        }
+                    }
+                    value
+                };
+            }
+        }
+        let key = hash_combine(hash_combine(seed, 0x7061_7468), object);
+        Self { vectors, scramble: std::array::from_fn(|d| hash_combine(key, d as u64) as u32) }
+    }
+
+    /// All dimensions of point number `index`, as 32 random bits each.
+    #[inline]
+    pub fn point(&self, index: u32) -> [u32; DIMENSIONS] {
+        std::array::from_fn(|d| {
+            let mut bits = 0;
+            let mut rest = index;
+            while rest != 0 {
+                bits ^= self.vectors[d][rest.trailing_zeros() as usize];
+                rest &= rest - 1;
+            }
+            owen_scramble(bits, self.scramble[d])
+        })
+    }
+
+    /// The numbers of point `index`: one in full precision for the area table, the others in f32.
+    #[inline]
+    pub fn numbers(&self, index: u32) -> (f64, [f32; DIMENSIONS - 1]) {
+        let bits = self.point(index);
+        (unit_f64(bits[0]), std::array::from_fn(|d| unit_f32(bits[d + 1])))
+    }
+}
+
+/// Hash-based Owen scrambling: each bit is flipped by a hash of the bits above it [Laine, Karras 2011; constants
+/// of Vegdahl 2021].
+#[inline]
+fn owen_scramble(bits: u32, seed: u32) -> u32 {
+    let mut x = bits.reverse_bits();
+    x ^= x.wrapping_mul(0x3d20_adea);
+    x = x.wrapping_add(seed);
+    x = x.wrapping_mul((seed >> 16) | 1);
+    x ^= x.wrapping_mul(0x0552_6c56);
+    x ^= x.wrapping_mul(0x53a2_2864);
+    x.reverse_bits()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_dimension_fills_each_of_2_to_k_intervals_once() {
+        let stream = CacheStream::new(3, 0);
+        for k in [4, 10] {
+            for d in 0..DIMENSIONS {
+                let mut seen = vec![false; 1 << k];
+                for i in 0..1 << k {
+                    let cell = (stream.point(i)[d] >> (32 - k)) as usize;
+                    assert!(!std::mem::replace(&mut seen[cell], true), "dimension {d}, point {i}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_two_dimensions_fill_every_elementary_box_once() {
+        let stream = CacheStream::new(5, 1);
+        for a in 0..=10 {
+            let mut seen = vec![false; 1 << 10];
+            for i in 0..1 << 10 {
+                let p = stream.point(i);
+                let cell = (u64::from(p[0]) >> (32 - a) << (10 - a) | u64::from(p[1]) >> (22 + a)) as usize;
+                assert!(!std::mem::replace(&mut seen[cell], true), "boxes 2^{a} x 2^{}", 10 - a);
+            }
+        }
+    }
+
+    /// Unscrambled, the first points are those of the published table's generator.
+    #[test]
+    fn direction_numbers_are_those_of_the_table() {
+        let mut stream = CacheStream::new(0, 0);
+        let raw =
+            |s: &CacheStream, i: u32, d: usize| (0..32).filter(|b| i >> b & 1 == 1).fold(0, |x, b| x ^ s.vectors[d][b]);
+        stream.scramble = [0; DIMENSIONS];
+        let published = |i: u32, d: u32| sobol_burley::parts::sobol_rev(i.reverse_bits(), d).reverse_bits();
+        for d in 0..DIMENSIONS {
+            for i in [1, 2, 3, 5, 17, 1000, 65535] {
+                assert_eq!(raw(&stream, i, d) >> 16, published(i, d as u32) >> 16, "dimension {d}, point {i}");
+            }
+        }
+    }
+
+    #[test]
+    fn seeds_and_objects_have_streams_of_their_own_and_values_are_pinned() {
+        let first = |seed, object| CacheStream::new(seed, object).point(1);
+        assert_ne!(first(1, 0), first(2, 0));
+        assert_ne!(first(1, 0), first(1, 1));
+        assert_eq!(first(1, 0), CacheStream::new(1, 0).point(1));
+    }
+}

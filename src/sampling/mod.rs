@@ -1,0 +1,10 @@
+//! Random numbers as pure functions of (seed, point, sample index, dimension), and what is warped from them.
+//! Not for: what a number is used for. Read first: `stream.rs`.
+
+mod cache_stream;
+mod stream;
+mod warp;
+
+pub use cache_stream::CacheStream;
+pub use stream::PixelStream;
+pub use warp::{cosine_hemisphere, disk};

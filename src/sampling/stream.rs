@@ -1,0 +1,97 @@
+//! The numbers of one sample of one pixel.
+
+use crate::math::hash_combine;
+
+/// Owen-scrambled Sobol numbers [Burley 2020] of one pixel sample, in sets of four dimensions; each set of
+/// each pixel is scrambled on its own. A pure function of (seed, pixel, sample, dimension): copies and
+/// threads cannot disturb it.
+#[derive(Clone, Copy, Debug)]
+pub struct PixelStream {
+    key: u64,
+    index: u32,
+    dimension: u32,
+}
+
+/// `sobol_burley` tabulates 2^16 points; later samples start a new, independently scrambled sequence.
+const SEQUENCE_LENGTH: u32 = 1 << 16;
+
+impl PixelStream {
+    /// The stream of sample number `sample` of pixel number `pixel`.
+    pub fn new(seed: u64, pixel: u64, sample: u32) -> Self {
+        let key = hash_combine(hash_combine(seed, pixel), u64::from(sample / SEQUENCE_LENGTH));
+        Self { key, index: sample % SEQUENCE_LENGTH, dimension: 0 }
+    }
+
+    /// The next two dimensions, in [0, 1).
+    #[inline]
+    pub fn next_2d(&mut self) -> [f32; 2] {
+        // A pair never straddles two sets of four.
+        self.dimension = self.dimension.next_multiple_of(2);
+        [self.next_1d(), self.next_1d()]
+    }
+
+    /// The next dimension, in [0, 1).
+    #[inline]
+    pub fn next_1d(&mut self) -> f32 {
+        let set_seed = hash_combine(self.key, u64::from(self.dimension / 4)) as u32;
+        let value = sobol_burley::sample(self.index, self.dimension % 4, set_seed);
+        self.dimension += 1;
+        value
+    }
+
+    /// Part `part` of `parts` when one sample needs several of the same kind (occlusion rays, light
+    /// samples): all parts of all samples of a pixel form one Sobol sequence. It starts a new set of
+    /// dimensions; the caller goes on with [`Self::skip_split`].
+    #[inline]
+    pub fn split(&self, part: u32, parts: u32) -> Self {
+        let index = u64::from(self.index) * u64::from(parts) + u64::from(part);
+        let key = hash_combine(self.key, u64::from(self.dimension / 4) | 1 << 40);
+        let key = hash_combine(key, index / u64::from(SEQUENCE_LENGTH));
+        Self { key, index: (index % u64::from(SEQUENCE_LENGTH)) as u32, dimension: 0 }
+    }
+
+    /// Goes on to dimensions that no earlier [`Self::split`] of this stream has used.
+    #[inline]
+    pub fn skip_split(&mut self) {
+        self.dimension = (self.dimension / 4 + 1) * 4;
+    }
+
+    /// A key for numbers that need no stratification, such as one decision for each cached sample.
+    #[inline]
+    pub fn key(&self) -> u64 {
+        hash_combine(hash_combine(self.key, u64::from(self.index)), u64::from(self.dimension))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stream_is_a_pure_function_of_its_arguments() {
+        let numbers = |seed, pixel, sample| {
+            let mut s = PixelStream::new(seed, pixel, sample);
+            [s.next_1d(), s.next_2d()[0], s.next_2d()[1]].map(f32::to_bits)
+        };
+        assert_eq!(numbers(1, 2, 3), numbers(1, 2, 3));
+        for other in [numbers(2, 2, 3), numbers(1, 3, 3), numbers(1, 2, 4), numbers(1, 2, 3 + (1 << 16))] {
+            assert_ne!(other, numbers(1, 2, 3));
+        }
+    }
+
+    /// 256 samples of a pixel put one point into each of the 256 elementary boxes of a pair of dimensions.
+    #[test]
+    fn samples_of_a_pixel_are_stratified() {
+        for splits in [1_u32, 4] {
+            let mut boxes = [0; 256];
+            for sample in 0..256 / splits {
+                for part in 0..splits {
+                    let mut s = PixelStream::new(7, 11, sample).split(part, splits);
+                    let [u, v] = s.next_2d();
+                    boxes[(u * 16.0) as usize * 16 + (v * 16.0) as usize] += 1;
+                }
+            }
+            assert!(boxes.iter().all(|&n| n == 1), "{splits}: {boxes:?}");
+        }
+    }
+}

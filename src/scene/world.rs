@@ -1,0 +1,82 @@
+//! The checked world: everything in scene units, relative to the scene's centre.
+
+use super::Camera;
+use crate::bssrdf::ModelName;
+use crate::geometry::Mesh;
+use crate::math::{DVec3, Rgb};
+use crate::optics::Medium;
+
+/// A scene whose numbers have been checked.
+pub struct Scene {
+    /// Where it came from, for messages.
+    pub name: String,
+    /// Length of one unit [mm]; `None` if the file does not say.
+    pub unit_in_mm: Option<f64>,
+    /// Where the scene's own origin lies in file coordinates [unit]: the centre of all objects, subtracted in f64
+    /// so that far-off scenes keep their digits.
+    pub centre: DVec3,
+    /// The camera.
+    pub camera: Camera,
+    /// All surfaces; index = mesh index of a ray backend.
+    pub objects: Vec<Object>,
+    /// All materials; objects point into this list.
+    pub materials: Vec<Material>,
+    /// Radiance from every direction that meets no surface [W/(m² sr) or any linear unit]; black without one.
+    pub environment: Rgb,
+    /// Oddities a user should hear of, in order of the file.
+    pub warnings: Vec<String>,
+}
+
+/// A mesh with a material.
+pub struct Object {
+    /// Name in the scene file.
+    pub name: String,
+    /// The mesh in scene space.
+    pub mesh: Mesh,
+    /// Index into [`Scene::materials`].
+    pub material: usize,
+}
+
+/// What a surface does to light.
+pub struct Material {
+    /// Name in the scene file.
+    pub name: String,
+    /// The kind and its numbers.
+    pub surface: Surface,
+}
+
+/// Kinds of surface.
+pub enum Surface {
+    /// Lambertian, both sides alike; `albedo` in [0, 1].
+    Diffuse {
+        /// Reflected over incident flux.
+        albedo: Rgb,
+    },
+    /// Sends out constant radiance, reflects nothing.
+    Emissive {
+        /// Radiance [same unit as the environment].
+        radiance: Rgb,
+        /// Both faces shine, not only the outward one.
+        two_sided: bool,
+    },
+    /// A scattering medium behind a smooth boundary.
+    Translucent(Translucent),
+}
+
+/// A medium and the model asked for it.
+pub struct Translucent {
+    /// Coefficients per scene unit.
+    pub medium: Medium,
+    /// BSSRDF model.
+    pub model: ModelName,
+    /// Where the numbers come from, for logs and headers.
+    pub source: String,
+}
+
+impl Scene {
+    /// The surface of an object.
+    #[inline]
+    pub fn surface(&self, object: u32) -> &Surface {
+        &self.materials[self.objects[object as usize].material].surface
+    }
+}
