@@ -1,1 +1,22 @@
-//! film
+//! What becomes of radiance samples: sums per pixel, pictures, files, and figures that compare pictures.
+//! Not for: how a sample is made, passes and threads (`render`), or records over time (`report`).
+//! Read first: `sums.rs` (the film), then `output.rs` (saving). docs/output.md tells users what is in the files.
+
+mod atomic;
+mod exr_file;
+mod exr_read;
+mod image;
+mod memory;
+mod output;
+mod png_file;
+mod sums;
+mod window;
+
+pub use atomic::write_atomically;
+pub use exr_file::{Attribute, Metadata, source_date_epoch};
+pub use exr_read::read_attributes;
+pub use image::Image;
+pub use output::{Format, PngOptions, SaveReport, check_writable, save};
+pub use png_file::PngReport;
+pub use sums::{BadSample, Counts, Film};
+pub use window::Window;

@@ -1,0 +1,189 @@
+//! Reading OpenEXR of any layout: scan lines or tiles, half or float, one part or several, with layers or without.
+
+use super::{Attribute, Image, Window, memory};
+use crate::math::Rgb;
+use crate::{Error, ErrorKind, Result};
+use exr::prelude as exr;
+use exr::{ReadChannels, ReadLayers};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+impl Image {
+    /// Reads the channels `R`, `G`, `B` of an EXR file; alpha and all other channels are ignored. Pixels of the
+    /// data window outside the display window (overscan) are left out.
+    ///
+    /// # Errors
+    /// File: not there, not an EXR file, cut short, channels missing (with the names of those it has), kinds of
+    /// data that are not read (deep data, subsampled channels). Memory if it would not fit.
+    pub fn read_exr(path: &Path) -> Result<Self> {
+        Self::read_exr_layer(path, None)
+    }
+
+    /// The same of the layer `layer`: channels `layer.R` and so on, or `R` and so on in a part of that name.
+    ///
+    /// # Errors
+    /// As [`Image::read_exr`].
+    pub fn read_exr_layer(path: &Path, layer: Option<&str>) -> Result<Self> {
+        let meta = read_meta(path)?;
+        if meta.headers.iter().all(|h| h.deep) {
+            return Err(Error::file(path, "read", "it holds deep data, which are not supported"));
+        }
+        let bytes = meta.headers.iter().map(|h| h.layer_size.0 as u128 * h.layer_size.1 as u128 * pixel_bytes(h)).sum();
+        let what = format!("{}: reading it", path.display());
+        memory::require(bytes, memory::available(), &what, "use a smaller picture")?;
+        let (names, part) = find(&meta, layer).ok_or_else(|| no_channels(path, layer, &meta))?;
+
+        let all = exr::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .non_parallel()
+            .from_unbuffered(open(path)?)
+            .map_err(|e| read_error(path, e))?;
+        let display = all.attributes.display_window;
+        let read = all
+            .layer_data
+            .iter()
+            .find(|l| {
+                l.attributes.layer_name == part
+                    && names.iter().all(|n| l.channel_data.list.iter().any(|c| c.name.as_slice() == n))
+            })
+            .ok_or_else(|| no_channels(path, layer, &meta))?;
+        let plane = |name: &Vec<u8>| -> Result<Vec<f32>> {
+            let channel = read.channel_data.list.iter().find(|c| c.name.as_slice() == name);
+            let samples = &channel.ok_or_else(|| no_channels(path, layer, &meta))?.sample_data;
+            if samples.len() != read.size.area() {
+                return Err(Error::file(path, "read", "it has subsampled channels, which are not supported"));
+            }
+            Ok(samples.values_as_f32().collect())
+        };
+        let planes = [plane(&names[0])?, plane(&names[1])?, plane(&names[2])?];
+        let pixel = |i: usize| Rgb::from_fn(|c| planes[c][i]);
+        place(path, display, read.absolute_bounds(), pixel)
+    }
+}
+
+/// The attributes of an EXR file's first part that hold a text or a number, by name; `marmor:*` among them.
+///
+/// # Errors
+/// File, as [`Image::read_exr`].
+pub fn read_attributes(path: &Path) -> Result<BTreeMap<String, Attribute>> {
+    let meta = read_meta(path)?;
+    let plain = |value: exr::AttributeValue| match value {
+        exr::AttributeValue::Text(t) => Some(Attribute::Text(String::from_utf8_lossy(t.as_slice()).into_owned())),
+        exr::AttributeValue::I32(v) => Some(Attribute::Number(v.into())),
+        exr::AttributeValue::F32(v) => Some(Attribute::Number(v.into())),
+        exr::AttributeValue::F64(v) => Some(Attribute::Number(v)),
+        _ => None,
+    };
+    let first = meta.headers.first().into_iter();
+    let named = first.flat_map(|h| h.all_named_attributes().map(|(n, v)| (String::from_utf8_lossy(n).into_owned(), v)));
+    Ok(named.filter_map(|(name, value)| Some((name, plain(value)?))).collect())
+}
+
+fn open(path: &Path) -> Result<File> {
+    match std::fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(Error::file(path, "read", "it is a folder")),
+        _ => File::open(path).map_err(|e| Error::file(path, "read", e)),
+    }
+}
+
+fn read_meta(path: &Path) -> Result<exr::MetaData> {
+    const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+    let mut start = Vec::new();
+    open(path)?.take(4).read_to_end(&mut start).map_err(|e| Error::file(path, "read", e))?;
+    if start != MAGIC {
+        let what = match start.as_slice() {
+            [] => "the file is empty",
+            [0x89, b'P', b'N', b'G'] => "it is a PNG file; an EXR file is needed",
+            _ => "it is not an EXR file",
+        };
+        return Err(Error::file(path, "read", what));
+    }
+    exr::MetaData::read_from_buffered(BufReader::new(open(path)?), false).map_err(|e| read_error(path, e))
+}
+
+/// What `error` says to someone who does not know the crate.
+fn read_error(path: &Path, error: exr::Error) -> Error {
+    match error {
+        exr::Error::Io(e) => Error::file(path, "read", e),
+        exr::Error::NotSupported(what) => Error::file(path, "read", format!("not supported: {what}")),
+        exr::Error::Invalid(what) if what.contains("missing bytes") => {
+            Error::file(path, "read", "the file is cut short or damaged")
+        }
+        exr::Error::Invalid(what) => Error::file(path, "read", format!("the file is damaged: {what}")),
+        exr::Error::Aborted => Error::file(path, "read", "stopped"),
+    }
+}
+
+fn pixel_bytes(header: &::exr::meta::header::Header) -> u128 {
+    header.channels.bytes_per_pixel as u128
+}
+
+/// The full names of the three channels and the part that has them.
+type Found = ([Vec<u8>; 3], Option<exr::Text>);
+
+fn find(meta: &exr::MetaData, layer: Option<&str>) -> Option<Found> {
+    let named = |prefix: &str| ["R", "G", "B"].map(|c| format!("{prefix}{c}").into_bytes());
+    let has = |h: &::exr::meta::header::Header, names: &[Vec<u8>; 3]| {
+        !h.deep && names.iter().all(|n| h.channels.list.iter().any(|c| c.name.as_slice() == n))
+    };
+    let name_of = |h: &::exr::meta::header::Header| h.own_attributes.layer_name.clone();
+    let mut headers = meta.headers.iter();
+    match layer {
+        None => headers.find(|h| has(h, &named(""))).map(|h| (named(""), name_of(h))),
+        Some(layer) => headers.find_map(|h| {
+            let in_part = name_of(h).is_some_and(|part| part.as_slice() == layer.as_bytes());
+            let prefixed = named(&format!("{layer}."));
+            if has(h, &prefixed) {
+                Some((prefixed, name_of(h)))
+            } else {
+                (in_part && has(h, &named(""))).then(|| (named(""), name_of(h)))
+            }
+        }),
+    }
+}
+
+fn no_channels(path: &Path, layer: Option<&str>, meta: &exr::MetaData) -> Error {
+    let wanted = layer.map_or("R, G, B".to_string(), |l| format!("{l}.R, {l}.G, {l}.B"));
+    let present = meta
+        .headers
+        .iter()
+        .flat_map(|h| &h.channels.list)
+        .map(|c| String::from_utf8_lossy(c.name.as_slice()).into_owned())
+        .collect::<Vec<_>>()
+        .join(", ");
+    Error::file(path, "read", format!("it has no channels {wanted}, only {present}"))
+}
+
+/// An image of those pixels that lie in the display window, whose upper left corner becomes (0, 0).
+fn place(
+    path: &Path,
+    display: exr::IntegerBounds,
+    data: exr::IntegerBounds,
+    pixel: impl Fn(usize) -> Rgb,
+) -> Result<Image> {
+    let side = |n: usize| {
+        u32::try_from(n).map_err(|_| Error::new(ErrorKind::File, format!("{}: damaged display window", path.display())))
+    };
+    let resolution = [side(display.size.0)?, side(display.size.1)?];
+    let shift = |data: i32, display: i32| i64::from(data) - i64::from(display);
+    let (dx, dy) = (shift(data.position.0, display.position.0), shift(data.position.1, display.position.1));
+    let inside = |at: i64, end: u32| at.clamp(0, i64::from(end)) as u32;
+    let window = Window {
+        x0: inside(dx, resolution[0]),
+        y0: inside(dy, resolution[1]),
+        x1: inside(dx + data.size.0 as i64, resolution[0]),
+        y1: inside(dy + data.size.1 as i64, resolution[1]),
+    };
+    if window.is_empty() {
+        return Err(Error::file(path, "read", "no pixel of it lies in its display window"));
+    }
+    let index = |[x, y]: [u32; 2]| (i64::from(y) - dy) as usize * data.size.0 + (i64::from(x) - dx) as usize;
+    let pixels = (0..window.area()).map(|i| pixel(index(window.pixel(i)))).collect();
+    Ok(Image { resolution, window, pixels })
+}

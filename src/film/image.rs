@@ -1,0 +1,48 @@
+//! A picture in memory.
+
+use super::Window;
+use crate::math::Rgb;
+
+/// Linear radiance for each pixel of a window of the whole picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Image {
+    /// [width, height] of the whole picture (EXR: the display window).
+    pub resolution: [u32; 2],
+    /// The pixels that are here (EXR: the data window).
+    pub window: Window,
+    /// Their values in row-major order.
+    pub pixels: Vec<Rgb>,
+}
+
+impl Image {
+    /// A picture of `resolution` = [width, height], all of it; `pixel(x, y)` gives each value.
+    pub fn from_fn(resolution: [u32; 2], mut pixel: impl FnMut(u32, u32) -> Rgb) -> Self {
+        let window = Window::full(resolution);
+        let pixels = (0..window.area())
+            .map(|i| {
+                let [x, y] = window.pixel(i);
+                pixel(x, y)
+            })
+            .collect();
+        Self { resolution, window, pixels }
+    }
+
+    /// The value at column x, row y of the whole picture; none outside the window.
+    pub fn get(&self, x: u32, y: u32) -> Option<Rgb> {
+        let w = self.window;
+        (w.x0 <= x && x < w.x1 && w.y0 <= y && y < w.y1).then(|| self.pixels[w.index(x, y)])
+    }
+
+    /// The part of this picture inside `window`, which may be empty.
+    #[must_use]
+    pub fn cropped(&self, window: Window) -> Self {
+        let window = self.window.intersection(window);
+        let pixels = (0..window.area())
+            .map(|i| {
+                let [x, y] = window.pixel(i);
+                self.pixels[self.window.index(x, y)]
+            })
+            .collect();
+        Self { resolution: self.resolution, window, pixels }
+    }
+}

@@ -1,0 +1,86 @@
+//! Saving a picture by the ending of its name.
+
+use super::{Image, Metadata, PngReport, atomic, exr_file, png_file};
+use crate::{Error, Result};
+use serde::Serialize;
+use std::io;
+use std::path::Path;
+
+/// Kinds of picture files that are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Linear radiance, `f32`.
+    Exr,
+    /// 8 bits per channel, for looking at.
+    Png,
+}
+
+impl Format {
+    /// The kind that `path` ends in; capitals count as small letters.
+    ///
+    /// # Errors
+    /// Usage for any other ending.
+    pub fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+        match ending.as_deref() {
+            Some("exr") => Ok(Self::Exr),
+            Some("png") => Ok(Self::Png),
+            _ => Err(Error::usage(format!(
+                "{}: the name of a picture ends in .exr (linear, for measuring) or .png (8 bits, for looking at)",
+                path.display()
+            ))),
+        }
+    }
+}
+
+/// How a PNG is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PngOptions {
+    /// Stops: radiance is multiplied by 2^exposure before the curve. Never chosen automatically.
+    pub exposure: f64,
+}
+
+/// What saving did to the values.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct SaveReport {
+    /// For a PNG: channel values that 8 bits could not hold. An EXR loses nothing.
+    pub png: Option<PngReport>,
+}
+
+/// Writes `image` to `path` as EXR or PNG, by its ending, so that the file is the old or the new one at any time.
+/// A PNG of a crop holds the crop alone.
+///
+/// # Errors
+/// Usage for another ending or an exposure that is not a number; File if it cannot be written.
+pub fn save(image: &Image, path: &Path, metadata: &Metadata, png: PngOptions) -> Result<SaveReport> {
+    match Format::of(path)? {
+        Format::Exr => {
+            let channels = exr_file::channels(image, None);
+            let bytes = exr_file::encode(image.resolution, image.window, channels, metadata)
+                .map_err(|e| e.within(path.display()))?;
+            atomic::write_atomically(path, |file| file.write_all(&bytes))?;
+            Ok(SaveReport { png: None })
+        }
+        Format::Png => {
+            if !png.exposure.is_finite() {
+                return Err(Error::usage(format!("exposure {} is not a number of stops", png.exposure)));
+            }
+            let mut report = PngReport::default();
+            atomic::write_atomically(path, |file| {
+                report = png_file::encode(image, png.exposure, file).map_err(io::Error::from)?;
+                Ok(())
+            })?;
+            Ok(SaveReport { png: Some(report) })
+        }
+    }
+}
+
+/// Whether [`save`] could write `path` now: its ending, its folder, the file in its place. Ask before a render, not
+/// after it. Leaves nothing behind.
+///
+/// # Errors
+/// As [`save`].
+pub fn check_writable(path: &Path) -> Result<()> {
+    Format::of(path)?;
+    atomic::check(path)
+}

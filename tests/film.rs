@@ -1,0 +1,262 @@
+//! The film, its files, and the figures that compare pictures.
+#![allow(clippy::unwrap_used)] // a fixture that cannot be made is a failed test
+
+use marmor::ErrorKind;
+use marmor::film::{
+    Attribute, BadSample, Film, Format, Image, Metadata, PngOptions, Window, check_writable, read_attributes, save,
+    write_atomically,
+};
+use marmor::math::{Rgb, hash_combine, unit_f64};
+use std::fs;
+use std::path::Path;
+
+fn noise(seed: u64, index: u64) -> f64 {
+    unit_f64((hash_combine(seed, index) >> 32) as u32)
+}
+
+fn picture(resolution: [u32; 2], seed: u64) -> Image {
+    Image::from_fn(resolution, |x, y| {
+        Rgb::from_fn(|c| noise(seed, u64::from(y) << 32 | u64::from(x) << 2 | c as u64) as f32)
+    })
+}
+
+fn names_in(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> =
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+// --- sums -------------------------------------------------------------------------------------------------
+
+#[test]
+fn the_mean_and_both_halves_are_those_of_the_samples() {
+    let window = Window { x0: 2, y0: 1, x1: 5, y1: 3 };
+    let mut film = Film::new([8, 4], window).unwrap();
+    // Values that are exact in binary, so that equality is exact.
+    for pass in 0..4_u32 {
+        for y in window.y0..window.y1 {
+            let row = Window { y0: y, y1: y + 1, ..window };
+            let samples: Vec<_> =
+                (window.x0..window.x1).map(|x| Rgb([(x * 8 + y) as f32, pass as f32, -0.5])).collect();
+            film.add(row, &samples);
+        }
+        film.end_pass();
+    }
+    let (mean, [even, odd]) = (film.image(), film.half_images().unwrap());
+    assert_eq!((mean.resolution, mean.window), ([8, 4], window));
+    assert_eq!(mean.get(3, 2), Some(Rgb([26.0, 1.5, -0.5])));
+    assert_eq!(even.get(3, 2), Some(Rgb([26.0, 1.0, -0.5]))); // passes 0 and 2
+    assert_eq!(odd.get(3, 2), Some(Rgb([26.0, 2.0, -0.5]))); // passes 1 and 3
+    // Of 0, 1, 2, 3: sample variance 5/3, of the mean a quarter of that.
+    let variance = film.variance().unwrap().get(3, 2).unwrap();
+    assert_eq!(variance[0], 0.0);
+    assert!((variance[1] - 5.0 / 12.0).abs() < 1e-6);
+    assert_eq!((film.counts().samples, film.counts().negative, film.passes()), (24, 24, 4));
+}
+
+#[test]
+fn a_sample_that_is_no_number_is_left_out_whole_and_counted() {
+    let mut film = Film::new([2, 2], Window::full([2, 2])).unwrap();
+    let (good, full) = (Rgb([1.0, 2.0, 3.0]), Window::full([2, 2]));
+    film.add(full, &[good; 4]);
+    film.end_pass();
+    film.add(full, &[good, good, Rgb([f32::NAN, 100.0, 100.0]), Rgb([100.0, 100.0, f32::INFINITY])]);
+    film.end_pass();
+    assert!(film.image().pixels.iter().all(|&p| p == good), "{:?}", film.image().pixels);
+    let counts = film.counts();
+    assert_eq!((counts.samples, counts.non_finite), (6, 2));
+    assert_eq!(counts.first_non_finite, Some(BadSample { pass: 1, pixel: [0, 1] }));
+    assert_eq!(film.empty_pixels(), 0);
+}
+
+#[test]
+fn the_order_of_tiles_within_a_pass_does_not_matter() {
+    let full = Window::full([7, 5]);
+    let tiles: Vec<_> =
+        (0..full.area()).map(|i| full.pixel(i)).map(|[x, y]| Window { x0: x, y0: y, x1: x + 1, y1: y + 1 }).collect();
+    let render = |order: &dyn Fn(usize) -> usize| {
+        let mut film = Film::new([7, 5], full).unwrap();
+        for pass in 0..3 {
+            for i in 0..tiles.len() {
+                let i = order(i);
+                let value = if i % 11 == 4 { f32::NAN } else { noise(pass, i as u64) as f32 - 0.1 };
+                film.add(tiles[i], &[Rgb::splat(value)]);
+            }
+            film.end_pass();
+        }
+        (film.image(), film.half_images(), film.counts())
+    };
+    assert_eq!(render(&|i| i), render(&|i| (i * 12 + 5) % 35));
+}
+
+#[test]
+fn a_film_that_cannot_be_is_an_error_not_a_crash() {
+    let error = |resolution, window| Film::new(resolution, window).unwrap_err();
+    let huge = [u32::MAX, u32::MAX];
+    let memory = error(huge, Window::full(huge));
+    assert_eq!(memory.kind(), ErrorKind::Memory);
+    assert!(memory.to_string().contains("needs") && memory.to_string().contains("--crop"), "{memory}");
+    for window in [Window { x0: 1, y0: 0, x1: 1, y1: 2 }, Window { x0: 0, y0: 0, x1: 3, y1: 2 }] {
+        assert_eq!(error([2, 2], window).kind(), ErrorKind::Usage);
+    }
+}
+
+// --- EXR --------------------------------------------------------------------------------------------------
+
+#[test]
+fn an_exr_gives_back_every_bit_and_every_attribute() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let mut image = picture([37, 21], 1);
+    image.pixels[5] = Rgb([-1.5, f32::MAX, f32::MIN_POSITIVE / 4.0]);
+    image.pixels[6] = Rgb([f32::INFINITY, -0.0, 1e-30]);
+    let scene = "material = \"Wei\u{df} \u{4f60}\"\n".repeat(200);
+    let metadata = Metadata {
+        samples_per_pixel: 64,
+        render_seconds: Some(2.5),
+        created: None,
+        attributes: vec![
+            ("marmor:scene".into(), Attribute::Text(scene.clone())),
+            ("marmor:seed".into(), Attribute::Count(u64::MAX)),
+            ("marmor:scale".into(), Attribute::Number(0.1)),
+        ],
+    };
+    save(&image, &path, &metadata, PngOptions::default()).unwrap();
+    assert_eq!(Image::read_exr(&path).unwrap(), image);
+    let read = read_attributes(&path).unwrap();
+    assert_eq!(read["marmor:scene"], Attribute::Text(scene));
+    assert_eq!(read["marmor:seed"], Attribute::Text(u64::MAX.to_string()));
+    assert_eq!(read["marmor:scale"], Attribute::Number(0.1));
+    assert_eq!(read["samplesPerPixel"], Attribute::Number(64.0));
+    assert_eq!(read["renderTimeSeconds"], Attribute::Number(2.5));
+    assert!(matches!(&read["software"], Attribute::Text(t) if t.starts_with("marmor ")));
+    assert!(!read.contains_key("capDate"));
+}
+
+#[test]
+fn a_crop_keeps_its_place_in_the_whole_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("crop.exr");
+    let crop = picture([40, 30], 2).cropped(Window { x0: 7, y0: 11, x1: 24, y1: 30 });
+    save(&crop, &path, &Metadata::default(), PngOptions::default()).unwrap();
+    assert_eq!(Image::read_exr(&path).unwrap(), crop);
+}
+
+#[test]
+fn a_date_appears_only_where_it_is_given_and_then_no_time_spent() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let metadata = Metadata { created: Some(951_782_400), render_seconds: Some(1.0), ..Default::default() };
+    save(&picture([4, 4], 3), &path, &metadata, PngOptions::default()).unwrap();
+    let read = read_attributes(&path).unwrap();
+    assert_eq!(read["capDate"], Attribute::Text("2000:02:29 00:00:00".into()));
+    assert!(!read.contains_key("renderTimeSeconds"));
+}
+
+// --- PNG --------------------------------------------------------------------------------------------------
+
+fn read_png(path: &Path) -> (u32, u32, bool, Vec<u8>) {
+    let mut reader = png::Decoder::new(std::io::BufReader::new(fs::File::open(path).unwrap())).read_info().unwrap();
+    let mut codes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut codes).unwrap();
+    assert_eq!((info.color_type, info.bit_depth), (png::ColorType::Rgb, png::BitDepth::Eight));
+    (info.width, info.height, reader.info().srgb.is_some(), codes)
+}
+
+#[test]
+fn a_png_has_the_srgb_codes_worked_out_by_hand_and_counts_what_it_cut() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.PNG");
+    let mut image = Image::from_fn([3, 1], |_, _| Rgb::BLACK);
+    image.pixels = vec![Rgb([0.18, 0.5, 0.001]), Rgb([1.0, 1.5, -0.2]), Rgb([f32::NAN, f32::INFINITY, 0.9])];
+    let report = save(&image, &path, &Metadata::default(), PngOptions::default()).unwrap().png.unwrap();
+    assert_eq!((report.above_one, report.below_zero, report.nan), (2, 1, 1));
+    assert_eq!(read_png(&path), (3, 1, true, vec![118, 188, 3, 255, 255, 0, 0, 255, 243]));
+    // One stop up: 0.36 -> 1.055 * 0.36^(1/2.4) - 0.055 = 0.634205 -> 161.722; 1.0 -> 255; 0.002 -> 0.02584 -> 6.589.
+    save(&image, &path, &Metadata::default(), PngOptions { exposure: 1.0 }).unwrap();
+    assert_eq!(read_png(&path).3[..3], [162, 255, 7]);
+}
+
+#[test]
+fn an_exposure_that_is_no_number_and_an_unknown_ending_are_usage_errors() {
+    let folder = tempfile::tempdir().unwrap();
+    let image = picture([2, 2], 4);
+    let png = folder.path().join("a.png");
+    let error = save(&image, &png, &Metadata::default(), PngOptions { exposure: f64::NAN }).unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::Usage);
+    for name in ["a.jpg", "a", ".exr", "exr"] {
+        let error = check_writable(&folder.path().join(name)).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::Usage, "{name}");
+        assert!(error.to_string().contains(".exr") && error.to_string().contains(".png"), "{error}");
+    }
+    assert_eq!(Format::of(Path::new("x/a.EXR")).unwrap(), Format::Exr);
+    assert!(names_in(folder.path()).is_empty());
+}
+
+// --- files are whole or not there -------------------------------------------------------------------------
+
+#[test]
+fn a_write_that_fails_midway_leaves_the_old_file_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    fs::write(&path, "old").unwrap();
+    let error = write_atomically(&path, |file| {
+        file.write_all(&[0; 100_000])?; // more than any buffer: some of it has reached the disk
+        Err(std::io::Error::other("the disk is full"))
+    })
+    .unwrap_err();
+    assert_eq!(error.kind(), ErrorKind::File);
+    assert!(error.to_string().contains("the disk is full") && error.to_string().contains("a.exr"), "{error}");
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(names_in(folder.path()), ["a.exr"]);
+    let panicking = std::panic::catch_unwind(|| write_atomically(&path, |_| panic!("a fault in the writer")));
+    assert!(panicking.is_err());
+    assert_eq!((fs::read(&path).unwrap(), names_in(folder.path())), (b"old".to_vec(), vec!["a.exr".to_string()]));
+    write_atomically(&path, |file| file.write_all(b"new")).unwrap();
+    assert_eq!((fs::read(&path).unwrap(), names_in(folder.path())), (b"new".to_vec(), vec!["a.exr".to_string()]));
+}
+
+#[test]
+fn what_stands_in_the_way_of_a_file_is_said_before_and_after_in_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir(at("folder.exr")).unwrap();
+    fs::write(at("file"), "").unwrap();
+    fs::write(at("read_only.exr"), "kept").unwrap();
+    let mut permissions = fs::metadata(at("read_only.exr")).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(at("read_only.exr"), permissions).unwrap();
+    let before = names_in(folder.path());
+    let cases = [
+        ("none/a.exr", "does not exist"),
+        ("file/a.exr", "is not a folder"),
+        ("folder.exr", "it is a folder"),
+        ("read_only.exr", "read-only"),
+    ];
+    for (name, said) in cases {
+        let path = at(name);
+        let early = check_writable(&path).unwrap_err();
+        let late = save(&picture([2, 2], 5), &path, &Metadata::default(), PngOptions::default()).unwrap_err();
+        assert_eq!(early.to_string(), late.to_string());
+        assert_eq!((early.kind(), late.kind()), (ErrorKind::File, ErrorKind::File));
+        let message = early.to_string();
+        assert!(message.contains(said) && message.starts_with(&path.display().to_string()), "{message}");
+        assert!(!message.contains('\n'), "{message}");
+    }
+    check_writable(&at("new.exr")).unwrap();
+    assert_eq!(names_in(folder.path()), before);
+    assert_eq!(fs::read(at("read_only.exr")).unwrap(), b"kept");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_link_stays_and_what_it_leads_to_is_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let (real, link) = (folder.path().join("real.exr"), folder.path().join("link.exr"));
+    fs::write(&real, "old").unwrap();
+    std::os::unix::fs::symlink("real.exr", &link).unwrap();
+    write_atomically(&link, |file| file.write_all(b"new")).unwrap();
+    assert!(fs::symlink_metadata(&link).unwrap().file_type().is_symlink());
+    assert_eq!(fs::read(&real).unwrap(), b"new");
+}
