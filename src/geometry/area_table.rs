@@ -54,6 +54,16 @@ impl AreaTable {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
+    /// Triangles with area.
+    pub fn len(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// Never true of a table that [`Self::new`] made.
+    pub fn is_empty(&self) -> bool {
+        self.triangles.is_empty()
+    }
+
     /// A point from `pick` in [0, 1) along the cumulative area and a point `u` of the unit square.
     #[inline]
     pub fn sample(&self, pick: f64, u: [f32; 2]) -> AreaSample {

@@ -1,1 +1,88 @@
-//! integrator
+//! From camera rays to radiance: one file per method.
+//! Not for: passes, tiles, files. Read first: [`Integrator`]; then `ambient_occlusion.rs`, the shortest.
+
+mod ambient_occlusion;
+mod direct;
+mod shade;
+mod subsurface;
+
+use crate::cache::GatherTally;
+use crate::math::Rgb;
+use crate::query::{Ray, RayQuery, RayTally};
+use crate::sampling::PixelStream;
+use crate::scene::Scene;
+pub use ambient_occlusion::AmbientOcclusion;
+pub use direct::Direct;
+pub use subsurface::{Subsurface, SubsurfaceOptions};
+
+/// The scene and the backend that was built for it.
+#[derive(Clone, Copy)]
+pub struct View<'a> {
+    /// The checked world.
+    pub scene: &'a Scene,
+    /// Rays against its meshes.
+    pub rays: &'a dyn RayQuery,
+}
+
+/// One sample of one pixel.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRay {
+    /// The ray.
+    pub ray: Ray,
+    /// The sample's numbers, those of the film position used up.
+    pub stream: PixelStream,
+}
+
+/// What the work cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Tally {
+    /// Rays by kind.
+    pub rays: RayTally,
+    /// Cached samples and pairs.
+    pub gather: GatherTally,
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.gather += other.gather;
+    }
+}
+
+/// A part of a method that a scene may or may not need.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Part {
+    /// What it is.
+    pub name: String,
+    /// Whether it is there.
+    pub built: bool,
+    /// Why, or how large.
+    pub why: String,
+}
+
+impl Part {
+    /// A part that is there.
+    pub fn built(name: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { name: name.into(), built: true, why: why.into() }
+    }
+
+    /// A part that is left out.
+    pub fn left_out(name: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { name: name.into(), built: false, why: why.into() }
+    }
+}
+
+/// A method: radiance for the camera rays of a tile.
+pub trait Integrator: Sync {
+    /// What all pixels of a pass share; `()` for most.
+    type Pass: Sync;
+
+    /// Prepares pass number `pass`.
+    fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass;
+
+    /// Radiance along each ray. Pure: the same arguments give the same bytes on any thread.
+    fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally);
+
+    /// What was built for this scene, and what was left out.
+    fn parts(&self, scene: &Scene) -> Vec<Part>;
+}

@@ -1,1 +1,29 @@
-//! light
+//! Light arriving at a surface point, before anything stands in its way.
+//! Not for: what the surface does with it (`integrator`, `cache`). Read first: [`Lights`].
+
+mod emitters;
+
+use crate::math::{Rgb, Vec3};
+use crate::query::{Hit, Ray};
+use crate::scene::{Scene, Surface};
+pub use emitters::Lights;
+
+/// One sampled direction from which light may arrive.
+#[derive(Clone, Copy, Debug)]
+pub struct Arrival {
+    /// Unit direction towards the light.
+    pub w: Vec3,
+    /// L_i cosθ_i / pdf: this sample's estimate of irradiance if nothing stands in the way
+    /// [radiance unit x sr].
+    pub irradiance: Rgb,
+    /// Light arrives if nothing is hit on this ray.
+    pub shadow: Ray,
+}
+
+/// Radiance that the surface at `hit` sends back along a ray with direction `towards` of its own, by emission.
+#[inline]
+pub fn emitted(scene: &Scene, hit: &Hit, towards: Vec3) -> Rgb {
+    let Surface::Emissive { radiance, two_sided } = scene.surface(hit.mesh) else { return Rgb::BLACK };
+    let n = scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
+    if *two_sided || n.dot(towards) < 0.0 { *radiance } else { Rgb::BLACK }
+}

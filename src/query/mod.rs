@@ -10,6 +10,9 @@ mod bvh;
 #[cfg(feature = "embree")]
 #[allow(unsafe_code)] // the one room that talks to C; every block says what makes it sound
 mod embree;
+mod tally;
+
+pub use tally::RayTally;
 
 /// Points `origin + t * direction` with `t_min` < t < `t_max`.
 #[derive(Clone, Copy, Debug)]

@@ -1,1 +1,181 @@
-//! render
+//! Passes over tiles on all cores. Knows passes and pixels, nothing of methods or files: progress, limits and records
+//! are observers called between passes with the clock stopped. Read first: [`run`].
+
+use crate::error::Result;
+use crate::film::{Film, Window};
+use crate::integrator::{CameraRay, Integrator, Tally, View};
+use crate::math::Rgb;
+use crate::sampling::PixelStream;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Edge of a tile [pixels].
+const TILE: u32 = 32;
+
+/// What is asked of a render.
+pub struct Job<'a> {
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Stop after this many passes; a pass is one sample of each pixel.
+    pub passes: Option<u32>,
+    /// Stop after the pass that reaches this time of rendering.
+    pub time: Option<Duration>,
+    /// Set from outside to stop: the running pass is dropped, unless it is the first.
+    pub cancel: &'a AtomicBool,
+}
+
+/// Where the time went [s]; writing and measuring are not in it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seconds {
+    /// Filling caches.
+    pub cache: f64,
+    /// Tracing, shading and gathering the tiles.
+    pub gather: f64,
+}
+
+impl Seconds {
+    /// All of rendering.
+    pub fn total(&self) -> f64 {
+        self.cache + self.gather
+    }
+}
+
+/// What observers see after a pass.
+pub struct Progress<'a> {
+    /// The film so far.
+    pub film: &'a Film,
+    /// Time of all passes so far.
+    pub seconds: Seconds,
+    /// Work of all passes so far.
+    pub tally: &'a Tally,
+    /// The job, for what is still to come.
+    pub job: &'a Job<'a>,
+}
+
+/// Called after each pass with the clock stopped.
+pub trait Observer {
+    /// An error ends the render.
+    ///
+    /// # Errors
+    /// Whatever the observer cannot do, such as writing a record.
+    fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()>;
+}
+
+/// Why a render ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// All passes are done.
+    Passes,
+    /// Time is up.
+    Time,
+    /// Somebody set [`Job::cancel`].
+    Cancelled,
+}
+
+/// What a finished render has to tell.
+#[derive(Debug)]
+pub struct Outcome {
+    /// Why it ended.
+    pub stop: Stop,
+    /// Time of all passes.
+    pub seconds: Seconds,
+    /// Work of all passes.
+    pub tally: Tally,
+}
+
+/// Adds passes to `film` until the job's passes or time are used up. The film does not depend on the number of
+/// threads of the rayon pool it is called in.
+///
+/// # Errors
+/// Only what an observer returns.
+pub fn run<I: Integrator>(
+    integrator: &I,
+    view: View<'_>,
+    job: &Job<'_>,
+    film: &mut Film,
+    observers: &mut [&mut dyn Observer],
+) -> Result<Outcome> {
+    let tiles = tiles(film.window());
+    let mut outcome = Outcome { stop: Stop::Passes, seconds: Seconds::default(), tally: Tally::default() };
+    loop {
+        outcome.stop = match job.passes {
+            Some(passes) if film.passes() >= passes => Stop::Passes,
+            _ if job.time.is_some_and(|limit| outcome.seconds.total() >= limit.as_secs_f64()) => Stop::Time,
+            _ if job.cancel.load(Ordering::Relaxed) && film.passes() > 0 => Stop::Cancelled,
+            _ => {
+                render_pass(integrator, view, job, film, &tiles, &mut outcome);
+                let progress = Progress { film, seconds: outcome.seconds, tally: &outcome.tally, job };
+                for observer in observers.iter_mut() {
+                    observer.after_pass(&progress)?;
+                }
+                continue;
+            }
+        };
+        return Ok(outcome);
+    }
+}
+
+/// One sample of each pixel. Cancelled in its middle, it leaves the film as it was, unless the film is empty.
+fn render_pass<I: Integrator>(
+    integrator: &I,
+    view: View<'_>,
+    job: &Job<'_>,
+    film: &mut Film,
+    tiles: &[Window],
+    outcome: &mut Outcome,
+) {
+    let (pass, mut tally, start) = (film.passes(), Tally::default(), Instant::now());
+    let shared = integrator.begin_pass(view, pass, &mut tally);
+    let filled = Instant::now();
+    let rendered: Vec<Option<(Vec<Rgb>, Tally)>> = tiles
+        .par_iter()
+        .map(|&tile| {
+            let dropped = pass > 0 && job.cancel.load(Ordering::Relaxed);
+            (!dropped).then(|| render_tile(integrator, view, job, tile, pass, &shared))
+        })
+        .collect();
+    outcome.seconds.cache += (filled - start).as_secs_f64();
+    outcome.seconds.gather += filled.elapsed().as_secs_f64();
+    let Some(rendered) = rendered.into_iter().collect::<Option<Vec<_>>>() else { return };
+    for (&tile, (samples, work)) in tiles.iter().zip(rendered) {
+        film.add(tile, &samples);
+        tally += work;
+    }
+    outcome.tally += tally;
+    film.end_pass();
+}
+
+fn render_tile<I: Integrator>(
+    integrator: &I,
+    view: View<'_>,
+    job: &Job<'_>,
+    tile: Window,
+    pass: u32,
+    shared: &I::Pass,
+) -> (Vec<Rgb>, Tally) {
+    let camera = &view.scene.camera;
+    let width = u64::from(camera.resolution[0]);
+    let mut rays = Vec::with_capacity(tile.area());
+    for y in tile.y0..tile.y1 {
+        for x in tile.x0..tile.x1 {
+            let mut stream = PixelStream::new(job.seed, u64::from(y) * width + u64::from(x), pass);
+            let ray = camera.ray([x, y], stream.next_2d());
+            rays.push(CameraRay { ray, stream });
+        }
+    }
+    let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
+    integrator.radiance(view, shared, &rays, &mut out, &mut tally);
+    (out, tally)
+}
+
+/// `window` cut into tiles, row by row.
+fn tiles(window: Window) -> Vec<Window> {
+    let mut tiles = Vec::new();
+    for y0 in (window.y0..window.y1).step_by(TILE as usize) {
+        for x0 in (window.x0..window.x1).step_by(TILE as usize) {
+            tiles.push(Window { x0, y0, x1: (x0 + TILE).min(window.x1), y1: (y0 + TILE).min(window.y1) });
+        }
+    }
+    tiles
+}

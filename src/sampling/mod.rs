@@ -5,6 +5,6 @@ mod cache_stream;
 mod stream;
 mod warp;
 
-pub use cache_stream::CacheStream;
+pub use cache_stream::{CacheStream, Points};
 pub use stream::PixelStream;
 pub use warp::{cosine_hemisphere, disk};

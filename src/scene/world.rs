@@ -69,6 +69,8 @@ pub struct Translucent {
     pub medium: Medium,
     /// BSSRDF model.
     pub model: ModelName,
+    /// Divide S_d by 4 C_phi(1/eta), so that the exit Fresnel factor loses no energy.
+    pub exit_normalisation: bool,
     /// Where the numbers come from, for logs and headers.
     pub source: String,
 }

@@ -1,0 +1,158 @@
+//! Filling the cache: random triangle by area, random point in it, a direction, what light arrives, what enters.
+
+use super::{Cache, CachedSample};
+use crate::bssrdf::Entry;
+use crate::error::{Error, Result, did_you_mean};
+use crate::geometry::{AreaTable, SurfacePoint};
+use crate::light::{Arrival, Lights, emitted};
+use crate::math::Rgb;
+use crate::optics::{refract, transmittance};
+use crate::query::{Ray, RayQuery, RayTally};
+use crate::sampling::CacheStream;
+use crate::scene::Scene;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// How the direction of arriving light is picked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EntrySampling {
+    /// Area lights by their own points, the environment by the cosine; half of the samples each if there are both.
+    Light,
+    /// Everything by the cosine: the lecture's way. L_t = T12 L_i π A.
+    Cosine,
+}
+
+impl std::str::FromStr for EntrySampling {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        match name {
+            "light" => Ok(Self::Light),
+            "cosine" => Ok(Self::Cosine),
+            _ => {
+                let hint = did_you_mean(name, ["light", "cosine"]);
+                Err(Error::usage(format!("no entry sampling `{name}`{hint}; there are `light` and `cosine`")))
+            }
+        }
+    }
+}
+
+/// What the filling of one object's cache needs, pass after pass.
+pub struct Filler<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its ray backend.
+    pub rays: &'a dyn RayQuery,
+    /// Its lights.
+    pub lights: &'a Lights,
+    /// The translucent object.
+    pub object: u32,
+    /// Its area table.
+    pub table: &'a AreaTable,
+    /// Its relative index of refraction.
+    pub eta: f32,
+    /// How directions are picked.
+    pub sampling: EntrySampling,
+    /// The object's long stream of points.
+    pub stream: &'a CacheStream,
+}
+
+/// Samples filled by one task; their shadow rays form one batch.
+const CHUNK: u64 = 256;
+
+impl Filler<'_> {
+    /// The samples with numbers `first`..`first + count`, in parallel. Which thread fills which sample does not
+    /// matter: a sample is a function of its number.
+    pub fn fill(&self, first: u64, count: u32, rays: &mut RayTally) -> Cache {
+        let chunks: Vec<(Vec<CachedSample>, RayTally)> = (0..u64::from(count).div_ceil(CHUNK))
+            .into_par_iter()
+            .map(|chunk| {
+                let start = chunk * CHUNK;
+                let end = (start + CHUNK).min(u64::from(count));
+                let mut tally = RayTally::default();
+                let lit = match self.sampling {
+                    EntrySampling::Light => self.by_light(first + start..first + end, &mut tally),
+                    EntrySampling::Cosine => self.by_cosine(first + start..first + end, &mut tally),
+                };
+                (lit, tally)
+            })
+            .collect();
+        let mut lit = Vec::with_capacity(chunks.iter().map(|(samples, _)| samples.len()).sum());
+        for (samples, tally) in chunks {
+            lit.extend(samples);
+            *rays += tally;
+        }
+        Cache { lit, attempted: count }
+    }
+
+    /// Candidates first, then all their shadow rays at once.
+    fn by_light(&self, numbers: std::ops::Range<u64>, tally: &mut RayTally) -> Vec<CachedSample> {
+        let mut candidates = Vec::with_capacity(CHUNK as usize);
+        for number in numbers {
+            let (at, u) = self.point(number);
+            let Some(arrival) = self.arrival(&at, u) else { continue };
+            if let Some(sample) = self.transmitted(&at, &arrival) {
+                candidates.push((sample, arrival.shadow));
+            }
+        }
+        let shadows: Vec<Ray> = candidates.iter().map(|(_, ray)| *ray).collect();
+        let mut occluded = vec![false; shadows.len()];
+        self.rays.occluded_batch(&shadows, &mut occluded);
+        tally.shadow += shadows.len() as u64;
+        candidates.into_iter().zip(occluded).filter(|(_, hidden)| !hidden).map(|((sample, _), _)| sample).collect()
+    }
+
+    /// One arrival from whichever kinds of light there are; each kind stands for its share of the samples.
+    fn arrival(&self, at: &SurfacePoint, u: [f32; 4]) -> Option<Arrival> {
+        match (self.lights.has_emitters(), self.lights.has_environment()) {
+            (false, false) => None,
+            (true, false) => self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]]),
+            (false, true) => self.lights.sample_environment(at, [u[1], u[2]]),
+            (true, true) => {
+                let mut arrival = if u[3] < 0.5 {
+                    self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]])
+                } else {
+                    self.lights.sample_environment(at, [u[1], u[2]])
+                }?;
+                arrival.irradiance *= 2.0;
+                Some(arrival)
+            }
+        }
+    }
+
+    /// Cosine-sampled directions, followed to whatever shines there.
+    fn by_cosine(&self, numbers: std::ops::Range<u64>, tally: &mut RayTally) -> Vec<CachedSample> {
+        let mut lit = Vec::new();
+        for number in numbers {
+            let (at, u) = self.point(number);
+            let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { continue };
+            tally.bounce += 1;
+            let radiance = match self.rays.closest(&ray) {
+                Some(hit) => emitted(self.scene, &hit, w),
+                None => self.lights.environment(),
+            };
+            if !radiance.is_black() {
+                lit.extend(self.transmitted(&at, &Arrival { w, irradiance: radiance * PI, shadow: ray }));
+            }
+        }
+        lit
+    }
+
+    /// Point number `number` of the surface, flat as the triangle it lies on, and four numbers for the light.
+    fn point(&self, number: u64) -> (SurfacePoint, [f32; 4]) {
+        let (pick, u) = self.stream.numbers(number);
+        let at = self.table.sample(pick, [u[0], u[1]]);
+        let mut point = self.scene.objects[self.object as usize].mesh.point(at.triangle, at.u, at.v);
+        // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
+        point.n = point.n_geometric;
+        (point, [u[2], u[3], u[4], u[5]])
+    }
+
+    /// Refracts an arrival into the medium; `None` where it is totally reflected.
+    fn transmitted(&self, at: &SurfacePoint, arrival: &Arrival) -> Option<CachedSample> {
+        let w = refract(arrival.w, at.n, self.eta)?;
+        let t12 = transmittance(self.eta, arrival.w.dot(at.n));
+        let flux: Rgb = arrival.irradiance * (t12 * self.table.area() as f32);
+        (!flux.is_black()).then_some(CachedSample { entry: Entry { x: at.x, n: at.n, w }, flux })
+    }
+}

@@ -1,0 +1,59 @@
+//! The share of the cosine-weighted hemisphere that is open.
+
+use super::{CameraRay, Integrator, Part, Tally, View};
+use crate::math::Rgb;
+use crate::query::{Hit, Ray};
+use crate::sampling::cosine_hemisphere;
+use crate::scene::Scene;
+
+/// (1/π) ∫ V(ω) cosθ dω over the hemisphere on the camera's side; grey, in [0, 1]; 1 where nothing is hit.
+pub struct AmbientOcclusion {
+    /// Surfaces farther than this do not occlude [unit]; infinite for none.
+    pub radius: f32,
+    /// Occlusion rays per camera ray, at least 1.
+    pub rays: u32,
+}
+
+impl Integrator for AmbientOcclusion {
+    type Pass = ();
+
+    fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
+
+    fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
+        let camera: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
+        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
+        view.rays.closest_batch(&camera, &mut hits);
+        tally.rays.camera += rays.len() as u64;
+
+        let per_hit = self.rays as usize;
+        let mut probes = Vec::with_capacity(rays.len() * per_hit);
+        for (ray, hit) in rays.iter().zip(&hits) {
+            let Some(hit) = hit else { continue };
+            let mesh = &view.scene.objects[hit.mesh as usize].mesh;
+            let at = mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.ray.direction);
+            for part in 0..self.rays {
+                let w = cosine_hemisphere(at.n, ray.stream.split(part, self.rays).next_2d());
+                probes.push(Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) });
+            }
+        }
+        let mut occluded = vec![false; probes.len()];
+        view.rays.occluded_batch(&probes, &mut occluded);
+        tally.rays.shadow += probes.len() as u64;
+
+        let mut groups = occluded.chunks_exact(per_hit);
+        for (hit, out) in hits.iter().zip(out) {
+            *out = match hit.and_then(|_| groups.next()) {
+                Some(group) => Rgb::splat(group.iter().filter(|&&hidden| !hidden).count() as f32 / per_hit as f32),
+                None => Rgb::WHITE,
+            };
+        }
+    }
+
+    fn parts(&self, _: &Scene) -> Vec<Part> {
+        vec![
+            Part::built("any-hit rays", format!("{} per camera ray", self.rays)),
+            Part::left_out("light table", "ambient occlusion asks no light"),
+            Part::left_out("area tables and sample cache", "ambient occlusion has no scattering"),
+        ]
+    }
+}

@@ -1,0 +1,84 @@
+//! Direct light on opaque surfaces: soft shadows of area lights.
+
+use super::shade::DirectLight;
+use super::{CameraRay, Integrator, Part, Tally, View};
+use crate::bssrdf::{Bssrdf, Model, ModelVisitor};
+use crate::light::{Lights, emitted};
+use crate::math::Rgb;
+use crate::query::{Hit, Ray};
+use crate::scene::{Scene, Surface};
+
+/// Lambertian surfaces under the scene's lights, without interreflection. A translucent surface is shown as
+/// a Lambertian one with its model's diffuse reflectance: a preview.
+pub struct Direct {
+    light: DirectLight,
+    /// Albedo of each object's surface.
+    albedo: Vec<Rgb>,
+}
+
+impl Direct {
+    /// `light_samples`: samples of each kind of light per camera ray, at least 1.
+    pub fn new(scene: &Scene, light_samples: u32) -> Self {
+        let light = DirectLight { lights: Lights::new(scene), samples: light_samples };
+        Self { light, albedo: lambertian_albedos(scene) }
+    }
+}
+
+/// The Lambertian albedo that stands for each object's surface.
+pub(super) fn lambertian_albedos(scene: &Scene) -> Vec<Rgb> {
+    struct Total;
+    impl ModelVisitor for Total {
+        type Out = Rgb;
+        fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
+            model.total()
+        }
+    }
+    let albedo = |surface: &Surface| match surface {
+        Surface::Diffuse { albedo } => *albedo,
+        Surface::Emissive { .. } => Rgb::BLACK,
+        Surface::Translucent(t) => Model::new(t.model, &t.medium, t.exit_normalisation).visit(Total),
+    };
+    scene.objects.iter().map(|o| albedo(&scene.materials[o.material].surface)).collect()
+}
+
+impl Integrator for Direct {
+    type Pass = ();
+
+    fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
+
+    fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
+        let camera: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
+        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
+        view.rays.closest_batch(&camera, &mut hits);
+        tally.rays.camera += rays.len() as u64;
+        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+            *out = match hit {
+                None => self.light.lights.environment(),
+                Some(hit) => {
+                    let mesh = &view.scene.objects[hit.mesh as usize].mesh;
+                    let at = mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.ray.direction);
+                    let mut stream = ray.stream;
+                    emitted(view.scene, hit, ray.ray.direction)
+                        + self.light.reflected(view, &at, self.albedo[hit.mesh as usize], &mut stream, tally)
+                }
+            };
+        }
+    }
+
+    fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let mut parts = self.light.parts(scene);
+        parts.push(Part::built(
+            "any-hit shadow rays",
+            format!("{} per camera ray and kind of light", self.light.samples),
+        ));
+        let translucent =
+            scene.objects.iter().any(|o| matches!(scene.materials[o.material].surface, Surface::Translucent(_)));
+        let why = if translucent {
+            "`direct` shows translucent surfaces as Lambertian ones of the same reflectance"
+        } else {
+            "no translucent material"
+        };
+        parts.push(Part::left_out("area tables and sample cache", why));
+        parts
+    }
+}

@@ -1,0 +1,205 @@
+//! Translucent surfaces: light gathered from a cache of transmitted-light samples, leaving through the boundary.
+
+use super::direct::lambertian_albedos;
+use super::shade::DirectLight;
+use super::{CameraRay, Integrator, Part, Tally, View};
+use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
+use crate::cache::{Cache, EntrySampling, Estimator, Filler, GatherTally, notes};
+use crate::geometry::{AreaTable, SurfacePoint};
+use crate::light::{Lights, emitted};
+use crate::math::{Rgb, Vec3};
+use crate::optics::{Medium, reflect, reflectance, transmittance};
+use crate::query::{Hit, Ray};
+use crate::sampling::{CacheStream, PixelStream, Points};
+use crate::scene::{Scene, Surface};
+
+/// Options of [`Subsurface`].
+#[derive(Clone, Copy, Debug)]
+pub struct SubsurfaceOptions {
+    /// Cached samples per pass and translucent object.
+    pub cache_samples: u32,
+    /// How the sum over the cache is estimated.
+    pub estimator: Estimator,
+    /// How directions of entering light are picked.
+    pub entry: EntrySampling,
+    /// How points on the surface are spread.
+    pub points: Points,
+    /// Whether smooth surfaces mirror lights and environment.
+    pub specular: bool,
+    /// Samples of each kind of light per diffuse point.
+    pub light_samples: u32,
+    /// Seed of the render.
+    pub seed: u64,
+}
+
+/// L_o = T21 Σ S_d L_t / M + specular reflection, over a cache refilled each pass. Light passes between points of one
+/// object only; what enters is direct light.
+pub struct Subsurface {
+    options: SubsurfaceOptions,
+    light: DirectLight,
+    albedo: Vec<Rgb>,
+    /// One for each object; `None` where it is not translucent or has no area.
+    bodies: Vec<Option<Body>>,
+}
+
+/// A translucent object.
+struct Body {
+    medium: Medium,
+    model: Model,
+    table: AreaTable,
+    stream: CacheStream,
+}
+
+impl Subsurface {
+    /// Tables for the translucent objects of `scene`, and for no others.
+    pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Self {
+        let body = |(index, object): (usize, &crate::scene::Object)| {
+            let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
+            Some(Body {
+                medium: t.medium,
+                model: Model::new(t.model, &t.medium, t.exit_normalisation),
+                table: AreaTable::new(&object.mesh)?,
+                stream: CacheStream::new(options.points, options.seed, index as u64),
+            })
+        };
+        Self {
+            options,
+            light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
+            albedo: lambertian_albedos(scene),
+            bodies: scene.objects.iter().enumerate().map(body).collect(),
+        }
+    }
+
+    fn shade(&self, view: View<'_>, pass: &[Option<Cache>], ray: &CameraRay, hit: &Hit, tally: &mut Tally) -> Rgb {
+        let at = surface_point(view, hit, ray.ray.direction);
+        let mut stream = ray.stream;
+        let object = hit.mesh as usize;
+        let (Some(body), Some(cache)) = (&self.bodies[object], &pass[object]) else {
+            return emitted(view.scene, hit, ray.ray.direction)
+                + self.light.reflected(view, &at, self.albedo[object], &mut stream, tally);
+        };
+        let w = -ray.ray.direction;
+        let eta = body.medium.eta;
+        // An interpolated normal may look away from the viewer; the triangle's own never does.
+        let mu = if at.n.dot(w) > 0.0 { at.n.dot(w) } else { at.n_geometric.dot(w) };
+        let exit = Exit { x: at.x, n: at.n, w };
+        let gather = Gather { cache, exit: &exit, key: stream.key(), tally: &mut tally.gather };
+        let inside = match self.options.estimator {
+            Estimator::Notes => body.model.visit(gather),
+        };
+        let mirrored = if self.options.specular {
+            self.mirrored(view, &at, w, &mut stream, tally) * reflectance(eta, mu)
+        } else {
+            Rgb::BLACK
+        };
+        inside * transmittance(eta, mu) + mirrored
+    }
+
+    /// Radiance from the mirror direction: lights, environment, and other surfaces as Lambertian ones.
+    fn mirrored(&self, view: View<'_>, at: &SurfacePoint, w: Vec3, stream: &mut PixelStream, tally: &mut Tally) -> Rgb {
+        let n = if at.n.dot(w) > 0.0 { at.n } else { at.n_geometric };
+        let direction = reflect(w, n);
+        if at.n_geometric.dot(direction) <= 0.0 {
+            return Rgb::BLACK;
+        }
+        tally.rays.bounce += 1;
+        match view.rays.closest(&Ray::new(at.leave(direction), direction)) {
+            None => self.light.lights.environment(),
+            Some(hit) => {
+                let there = surface_point(view, &hit, direction);
+                emitted(view.scene, &hit, direction)
+                    + self.light.reflected(view, &there, self.albedo[hit.mesh as usize], stream, tally)
+            }
+        }
+    }
+}
+
+/// The point of `hit`, its normals towards where the ray came from.
+fn surface_point(view: View<'_>, hit: &Hit, direction: Vec3) -> SurfacePoint {
+    view.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v).facing(-direction)
+}
+
+struct Gather<'a> {
+    cache: &'a Cache,
+    exit: &'a Exit,
+    key: u64,
+    tally: &'a mut GatherTally,
+}
+
+impl ModelVisitor for Gather<'_> {
+    type Out = Rgb;
+    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
+        notes(self.cache, model, self.exit, self.key, self.tally)
+    }
+}
+
+impl Integrator for Subsurface {
+    type Pass = Vec<Option<Cache>>;
+
+    fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        let fill = |(object, body): (usize, &Option<Body>)| {
+            let body = body.as_ref()?;
+            let filler = Filler {
+                scene: view.scene,
+                rays: view.rays,
+                lights: &self.light.lights,
+                object: object as u32,
+                table: &body.table,
+                eta: body.medium.eta,
+                sampling: self.options.entry,
+                stream: &body.stream,
+            };
+            let count = self.options.cache_samples;
+            let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            tally.gather.samples += u64::from(count);
+            tally.gather.lit += cache.lit.len() as u64;
+            Some(cache)
+        };
+        self.bodies.iter().enumerate().map(fill).collect()
+    }
+
+    fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
+        let camera: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
+        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
+        view.rays.closest_batch(&camera, &mut hits);
+        tally.rays.camera += rays.len() as u64;
+        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+            *out = match hit {
+                None => self.light.lights.environment(),
+                Some(hit) => self.shade(view, pass, ray, hit, tally),
+            };
+        }
+    }
+
+    fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let mut parts = self.light.parts(scene);
+        if self.bodies.iter().all(Option::is_none) {
+            parts.push(Part::left_out("area tables and sample cache", "no translucent material"));
+        }
+        for (object, body) in scene.objects.iter().zip(&self.bodies) {
+            let Some(body) = body else { continue };
+            let name = &object.name;
+            let bytes = self.options.cache_samples as usize * size_of::<crate::cache::CachedSample>();
+            parts.push(Part::built(
+                format!("sample cache of `{name}`"),
+                format!(
+                    "{} samples a pass ({:.1} MB), {} triangles",
+                    self.options.cache_samples,
+                    bytes as f64 / 1e6,
+                    body.table.len()
+                ),
+            ));
+            parts.push(if body.medium.is_grey() {
+                Part::left_out(format!("colour of `{name}`"), "a grey medium: S_d is evaluated in one channel")
+            } else {
+                Part::built(format!("colour of `{name}`"), "S_d is evaluated in three channels")
+            });
+        }
+        parts.push(if self.options.specular {
+            Part::built("specular reflection", "nearest-hit rays")
+        } else {
+            Part::left_out("specular reflection", "switched off")
+        });
+        parts
+    }
+}

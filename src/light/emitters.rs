@@ -1,0 +1,121 @@
+//! Triangle-mesh area lights and a constant environment.
+
+use super::Arrival;
+use crate::geometry::{AreaTable, SurfacePoint};
+use crate::math::{Rgb, Vec3};
+use crate::query::Ray;
+use crate::sampling::cosine_hemisphere;
+use crate::scene::{Scene, Surface};
+use std::f32::consts::PI;
+
+/// Everything that shines in a scene. Tables exist for emissive meshes only.
+pub struct Lights {
+    emitters: Vec<Emitter>,
+    /// Chance of each emitter and of all before it, in proportion to emitted power.
+    cumulative: Vec<f64>,
+    environment: Rgb,
+}
+
+struct Emitter {
+    object: u32,
+    table: AreaTable,
+    radiance: Rgb,
+    two_sided: bool,
+    /// Chance of a point per area [1/unit²]: the emitter's own chance over its area.
+    pdf_area: f32,
+}
+
+impl Lights {
+    /// The lights of a scene; an emissive mesh without area or radiance is no light.
+    pub fn new(scene: &Scene) -> Self {
+        let mut emitters = Vec::new();
+        let mut cumulative = Vec::new();
+        let mut power = 0.0;
+        for (object, o) in scene.objects.iter().enumerate() {
+            let Surface::Emissive { radiance, two_sided } = scene.materials[o.material].surface else { continue };
+            if radiance.is_black() {
+                continue;
+            }
+            let Some(table) = AreaTable::new(&o.mesh) else { continue };
+            power += table.area() * f64::from(radiance.mean()) * if two_sided { 2.0 } else { 1.0 };
+            cumulative.push(power);
+            emitters.push(Emitter { object: object as u32, table, radiance, two_sided, pdf_area: 0.0 });
+        }
+        let mut below = 0.0;
+        for (emitter, sum) in emitters.iter_mut().zip(&mut cumulative) {
+            *sum /= power;
+            emitter.pdf_area = ((*sum - below) / emitter.table.area()) as f32;
+            below = *sum;
+        }
+        Self { emitters, cumulative, environment: scene.environment }
+    }
+
+    /// Whether there are area lights.
+    pub fn has_emitters(&self) -> bool {
+        !self.emitters.is_empty()
+    }
+
+    /// Whether light arrives from the environment.
+    pub fn has_environment(&self) -> bool {
+        !self.environment.is_black()
+    }
+
+    /// Radiance from outside the scene; black without an environment.
+    pub fn environment(&self) -> Rgb {
+        self.environment
+    }
+
+    /// Triangles in the light table.
+    pub fn triangles(&self) -> usize {
+        self.emitters.iter().map(|e| e.table.len()).sum()
+    }
+
+    /// Number of emissive meshes.
+    pub fn emitters(&self) -> usize {
+        self.emitters.len()
+    }
+
+    /// Light from a random point of the area lights, picked by power and area; `None` where it comes from behind
+    /// the surface or leaves the light at its dark side.
+    pub fn sample_emitter(&self, scene: &Scene, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
+        let pick = f64::from(u[0]);
+        let chosen = self.cumulative.partition_point(|&c| c <= pick).min(self.emitters.len().checked_sub(1)?);
+        let emitter = &self.emitters[chosen];
+        let below = if chosen == 0 { 0.0 } else { self.cumulative[chosen - 1] };
+        let within = (pick - below) / (self.cumulative[chosen] - below);
+        let sample = emitter.table.sample(within, [u[1], u[2]]);
+        let light = scene.objects[emitter.object as usize].mesh.point(sample.triangle, sample.u, sample.v);
+
+        let to_light = light.x - at.x;
+        let distance = to_light.length();
+        if distance <= 0.0 {
+            return None;
+        }
+        let w = to_light / distance;
+        let (cos, cos_light) = (at.n.dot(w), -light.n_geometric.dot(w));
+        let cos_light = if emitter.two_sided { cos_light.abs() } else { cos_light };
+        if cos <= 0.0 || cos_light <= 0.0 || at.n_geometric.dot(w) <= 0.0 {
+            return None;
+        }
+        // Divided one length at a time: distance² leaves the range of f32 long before the quotient does.
+        let solid_angle = cos_light / distance / distance / emitter.pdf_area;
+        let shadow = Ray::between(at.leave(w), light.leave(-w));
+        Some(Arrival { w, irradiance: emitter.radiance * (cos * solid_angle), shadow })
+    }
+
+    /// Light of the environment from a cosine-weighted direction about the surface's normal.
+    pub fn sample_environment(&self, at: &SurfacePoint, u: [f32; 2]) -> Option<Arrival> {
+        let w = cosine_hemisphere(at.n, u);
+        (at.n_geometric.dot(w) > 0.0).then(|| Arrival {
+            w,
+            irradiance: self.environment * PI,
+            shadow: Ray::new(at.leave(w), w),
+        })
+    }
+
+    /// A cosine-weighted direction about the surface's normal and the ray that looks there.
+    pub fn look_up(at: &SurfacePoint, u: [f32; 2]) -> Option<(Vec3, Ray)> {
+        let w = cosine_hemisphere(at.n, u);
+        (at.n_geometric.dot(w) > 0.0).then(|| (w, Ray::new(at.leave(w), w)))
+    }
+}

@@ -1,0 +1,90 @@
+//! One JSON line per pass.
+
+use crate::cache::GatherTally;
+use crate::error::{Error, Result};
+use crate::film::Counts;
+use crate::query::RayTally;
+use serde::Serialize;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// The state of a render after a pass; keys are stable, later versions only add some. All counts and times are
+/// totals since the start.
+#[derive(Clone, Debug, Serialize)]
+pub struct Record {
+    /// Passes done.
+    pub pass: u32,
+    /// Samples of each pixel.
+    pub samples: u32,
+    /// Reading the scene and building trees and tables [s].
+    pub seconds_setup: f64,
+    /// Filling caches [s].
+    pub seconds_cache: f64,
+    /// Tracing, shading and gathering [s].
+    pub seconds_gather: f64,
+    /// Setup, cache and gathering; writing and measuring are not in it [s].
+    pub seconds_total: f64,
+    /// Rays by kind.
+    pub rays: RayTally,
+    /// Cached samples and pairs of points.
+    pub gather: GatherTally,
+    /// Distance to the reference; absent without one.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub error: Option<ErrorFigures>,
+    /// Samples left out because they are not numbers.
+    pub non_finite: u64,
+    /// Samples clamped: none, marmor clamps nothing.
+    pub clamped: u64,
+    /// Samples below zero, kept.
+    pub negative: u64,
+}
+
+/// Figures against a reference picture (docs/output.md has the formulas).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ErrorFigures {
+    /// Root of the mean squared difference.
+    pub rmse: f64,
+    /// Mean squared difference relative to the reference.
+    pub relmse: f64,
+    /// 95 % interval of `relmse`.
+    pub interval: [f64; 2],
+}
+
+impl Record {
+    /// Takes over the film's counts.
+    #[must_use]
+    pub fn with_counts(mut self, counts: &Counts) -> Self {
+        self.non_finite = counts.non_finite;
+        self.negative = counts.negative;
+        self
+    }
+}
+
+/// A file of records, flushed after each line so that an interrupted render keeps them all.
+pub struct RecordFile {
+    path: PathBuf,
+    out: BufWriter<File>,
+}
+
+impl RecordFile {
+    /// Starts a new file at `path`, over whatever is there.
+    ///
+    /// # Errors
+    /// A file error with the path.
+    pub fn create(path: &Path) -> Result<Self> {
+        let file = File::create(path).map_err(|e| Error::file(path, "write records", e))?;
+        Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
+    }
+
+    /// Appends a line.
+    ///
+    /// # Errors
+    /// A file error with the path.
+    pub fn append(&mut self, record: &Record) -> Result<()> {
+        let line = serde_json::to_string(record).map_err(|e| Error::file(&self.path, "write records", e))?;
+        writeln!(self.out, "{line}")
+            .and_then(|()| self.out.flush())
+            .map_err(|e| Error::file(&self.path, "write records", e))
+    }
+}
