@@ -5,8 +5,13 @@ mod area_table;
 mod mesh;
 mod morton;
 mod obj;
+mod obj_lines;
+mod obj_mesh;
+mod shapes;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;
 pub use obj::load_obj;
+pub use obj_mesh::{ObjMesh, ObjNormals};
+pub use shapes::{rectangle, sphere};

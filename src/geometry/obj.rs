@@ -1,20 +1,120 @@
 //! OBJ files through `tobj`: positions in f64, polygons cut into triangles, groups joined.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
+use super::obj_lines::ObjLines;
+use super::{ObjMesh, ObjNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 
-/// What an OBJ file holds, before any transform.
-pub struct ObjMesh {
-    /// Positions as typed, in f64.
-    pub positions: Vec<DVec3>,
-}
-
-/// Reads a file.
+/// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
+/// left out. A polygon becomes the fan of triangles about its first corner, which is right for convex polygons and
+/// covers too much for concave ones: triangulate those in the modelling program. Texture coordinates, vertex colours,
+/// materials, smoothing groups and curves are not read; a missing MTL file is no error. Points and lines are counted
+/// in [`ObjMesh::ignored`]. A face has the file's normals only where all its corners have one.
 ///
 /// # Errors
-/// A file error names the path; a malformed one names the line too.
+/// A file error if `path` cannot be read. A scene error that names path and line if a vertex is not finite or not a
+/// number, an index is 0 or of a vertex that does not exist, or a line is longer than 1 MiB; one that names the path
+/// if there are no faces.
 pub fn load_obj(path: &Path) -> Result<ObjMesh> {
-    Err(Error::file(path, "read", "not yet written"))
+    let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
+    if !metadata.is_file() {
+        let what = if metadata.is_dir() { "it is a folder" } else { "it is not a regular file" };
+        return Err(Error::file(path, "read", format!("{what}; name an OBJ file")));
+    }
+    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
+    parse(&mut ObjLines::new(BufReader::with_capacity(1 << 16, file)), path)
+}
+
+fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<ObjMesh> {
+    let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
+    let loaded = tobj::load_obj_buf(lines, &options, |_| Err(tobj::LoadError::OpenFileFailed));
+    // What the reader of lines found first; tobj's own complaints carry no line.
+    if let Some(cause) = lines.failed_read() {
+        return Err(Error::file(path, "read", cause));
+    }
+    let at = |line: usize, what: &str| Error::scene(format!("{}:{line}: {what}", path.display()));
+    if let Some((line, what)) = lines.complaint() {
+        return Err(at(line, &what));
+    }
+    use tobj::LoadError::{FaceNormalOutOfBounds, FaceVertexOutOfBounds};
+    if matches!(loaded, Ok(_) | Err(FaceVertexOutOfBounds | FaceNormalOutOfBounds))
+        && let Some((line, what)) = lines.never_defined()
+    {
+        return Err(at(line, &what));
+    }
+    let (models, _) = loaded.map_err(|e| at(lines.line(), &explain(e, lines.current())))?;
+    let mut out = ObjMesh { ignored: lines.ignored(), ..ObjMesh::default() };
+    // The reader of lines drops `o`, `g` and `usemtl`, so there is one model.
+    for model in models {
+        let (base, mesh) = (out.positions.len() as u32, model.mesh);
+        out.positions.extend(mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0], p[1], p[2])));
+        out.triangles.extend(mesh.indices.chunks_exact(3).map(|t| [base + t[0], base + t[1], base + t[2]]));
+        out.normals = normals(&mesh, lines.has_normals());
+    }
+    if out.triangles.is_empty() {
+        return Err(Error::scene(format!(
+            "{}: no faces: {}; export the surface as polygons (`v` and `f` lines)",
+            path.display(),
+            if lines.line() == 0 {
+                "the file is empty".into()
+            } else if lines.vertices() == 0 {
+                "and no vertices either; is it an OBJ file?".into()
+            } else {
+                format!("{} vertices, {} points and lines", lines.vertices(), out.ignored)
+            }
+        )));
+    }
+    // A vertex divided by its weight may overflow; the reader of lines saw only what was typed.
+    if let Some(p) = out.positions.iter().find(|p| !p.is_finite()) {
+        return Err(Error::scene(format!(
+            "{}: a vertex divided by its weight is not finite ({p}); remove the fourth number of `v`",
+            path.display()
+        )));
+    }
+    Ok(out)
+}
+
+/// The normals of the triangles that have them. tobj makes up an index where a corner has none: `has` says where.
+fn normals(mesh: &tobj::Mesh, has: &[bool]) -> Option<ObjNormals> {
+    if !has.contains(&true) {
+        return None;
+    }
+    let vectors: Vec<DVec3> = mesh
+        .normals
+        .chunks_exact(3)
+        .map(|n| {
+            let n = DVec3::new(n[0], n[1], n[2]);
+            // Divided by its largest component first, so that no length overflows or vanishes.
+            (n / n.abs().max_element()).normalize_or_zero()
+        })
+        .collect();
+    let triangles = mesh
+        .normal_indices
+        .chunks_exact(3)
+        .zip(has)
+        .map(|(t, &has)| {
+            let usable = has && t.iter().all(|&i| vectors[i as usize] != DVec3::ZERO);
+            usable.then(|| [t[0], t[1], t[2]])
+        })
+        .collect();
+    Some(ObjNormals { vectors, triangles })
+}
+
+/// tobj's complaint in words that say what to mend.
+fn explain(error: tobj::LoadError, line: &str) -> String {
+    use tobj::LoadError as E;
+    let (what, remedy) = match error {
+        E::PositionParseError => ("no vertex", "expected `v x y z`, three numbers with decimal points"),
+        E::ScalingByZeroError => ("a vertex of weight 0", "expected `v x y z`, or a fourth number other than 0"),
+        E::ColorParseError => ("no vertex", "expected three, four or six numbers after `v`"),
+        E::NormalParseError => ("no normal", "expected `vn x y z`, three numbers with decimal points"),
+        E::FaceParseError | E::InvalidPolygon => ("no face", "expected `f` and at least three vertex numbers"),
+        E::FaceVertexOutOfBounds | E::FaceNormalOutOfBounds => ("a face of vertices that do not exist", "export again"),
+        other => return format!("not readable as OBJ: {other}"),
+    };
+    format!("{what} in `{}`; {remedy}", super::obj_lines::shown(line))
 }

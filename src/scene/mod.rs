@@ -3,7 +3,18 @@
 //! `load.rs` (the way from one to the other).
 
 mod camera;
+mod file;
+mod load;
+mod materials;
+mod objects;
+mod options;
+mod tree;
+mod warnings;
 mod world;
 
 pub use camera::Camera;
+pub use file::{CameraEntry, FovAxis, SceneFile};
+pub use materials::MaterialEntry;
+pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
+pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, RenderOptions};
 pub use world::{Material, Object, Scene, Surface, Translucent};

@@ -38,6 +38,7 @@ pub struct Object {
 }
 
 /// What a surface does to light.
+#[derive(Clone, Debug)]
 pub struct Material {
     /// Name in the scene file.
     pub name: String,
@@ -46,6 +47,7 @@ pub struct Material {
 }
 
 /// Kinds of surface.
+#[derive(Clone, Debug)]
 pub enum Surface {
     /// Lambertian, both sides alike; `albedo` in [0, 1].
     Diffuse {
@@ -64,6 +66,7 @@ pub enum Surface {
 }
 
 /// A medium and the model asked for it.
+#[derive(Clone, Debug)]
 pub struct Translucent {
     /// Coefficients per scene unit.
     pub medium: Medium,

@@ -1,0 +1,263 @@
+//! The lines of an OBJ file on their way to `tobj`: counted, so that a complaint can name one, and reduced to what we
+//! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
+
+use std::io::{self, BufRead, Read};
+
+/// Longer than any real line; keeps a binary file from being read as one.
+const MAX_LINE: usize = 1 << 20;
+
+/// Hands on `v`, `vn` and `f` lines alone; indices come out absolute, checked, without texture coordinates.
+pub(super) struct ObjLines<R> {
+    source: R,
+    /// The line being handed on, and how much of it is gone.
+    out: String,
+    taken: usize,
+    /// Number of the last line read, from 1.
+    line: usize,
+    vertices: usize,
+    normals: usize,
+    /// Largest positive index that had no vertex or normal yet, with its line: a file may define them later.
+    forward: [Option<(usize, usize)>; 2],
+    has_normals: Vec<bool>,
+    ignored: usize,
+    complaint: Option<(usize, String)>,
+    failed: Option<io::Error>,
+}
+
+/// At most 40 characters of a line, for messages.
+pub(super) fn shown(line: &str) -> String {
+    let line = line.trim();
+    let mut text: String = line.chars().take(40).flat_map(char::escape_debug).collect();
+    if line.chars().nth(40).is_some() {
+        text.push_str("...");
+    }
+    text
+}
+
+impl<R: BufRead> ObjLines<R> {
+    pub(super) fn new(source: R) -> Self {
+        Self {
+            source,
+            out: String::new(),
+            taken: 0,
+            line: 0,
+            vertices: 0,
+            normals: 0,
+            forward: [None; 2],
+            has_normals: Vec::new(),
+            ignored: 0,
+            complaint: None,
+            failed: None,
+        }
+    }
+
+    /// Number of the last line handed on.
+    pub(super) fn line(&self) -> usize {
+        self.line
+    }
+
+    /// The last line handed on.
+    pub(super) fn current(&self) -> &str {
+        &self.out
+    }
+
+    pub(super) fn vertices(&self) -> usize {
+        self.vertices
+    }
+
+    /// Points, lines, and faces with fewer than three corners.
+    pub(super) fn ignored(&self) -> usize {
+        self.ignored
+    }
+
+    /// For each triangle of the fans, whether all corners of its face had a normal.
+    pub(super) fn has_normals(&self) -> &[bool] {
+        &self.has_normals
+    }
+
+    /// Why the source could not be read, if it could not.
+    pub(super) fn failed_read(&mut self) -> Option<io::Error> {
+        self.failed.take()
+    }
+
+    /// The first thing wrong with a line itself, with its number.
+    pub(super) fn complaint(&mut self) -> Option<(usize, String)> {
+        self.complaint.take()
+    }
+
+    /// The largest index that no line up to the end defines, with the number of its line. Ask when all are read.
+    pub(super) fn never_defined(&self) -> Option<(usize, String)> {
+        let counts = [("vertex", self.vertices), ("normal", self.normals)];
+        self.forward.iter().zip(counts).find_map(|(forward, (name, count))| {
+            let (index, line) = (*forward)?;
+            (index > count).then(|| (line, out_of_range(name, index as i64, count)))
+        })
+    }
+
+    /// One line of the source into `raw`, `\` at its end joining the next; false at the end of the file.
+    fn read_line(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
+        raw.clear();
+        loop {
+            let start = raw.len();
+            let read = (&mut self.source).take((MAX_LINE - start) as u64 + 1).read_until(b'\n', raw)?;
+            if read == 0 {
+                return Ok(start > 0);
+            }
+            self.line += 1;
+            if raw.len() > MAX_LINE {
+                self.complaint = Some((self.line, "a line of more than 1 MiB; is it an OBJ file?".into()));
+                return Ok(false);
+            }
+            while raw.last().is_some_and(u8::is_ascii_whitespace) {
+                raw.pop();
+            }
+            if raw.last() != Some(&b'\\') {
+                return Ok(true);
+            }
+            raw.pop();
+            raw.push(b' ');
+        }
+    }
+
+    /// The next line that matters into `out`; leaves it empty at the end or at a complaint.
+    fn advance(&mut self) -> io::Result<()> {
+        let mut raw = Vec::new();
+        self.taken = 0;
+        self.out.clear();
+        while self.out.is_empty() && self.read_line(&mut raw)? {
+            let words = raw.trim_ascii();
+            let keyword = words.split(u8::is_ascii_whitespace).next().unwrap_or_default();
+            match keyword {
+                b"l" | b"p" => self.ignored += 1,
+                b"v" | b"vn" | b"f" => {
+                    // Anything but UTF-8 is no number; the replacement character makes tobj say so.
+                    let text = String::from_utf8_lossy(words).into_owned();
+                    let checked = if keyword == b"f" { self.face(&text) } else { self.vector(&text, keyword == b"v") };
+                    if let Err(what) = checked {
+                        self.complaint = Some((self.line, what));
+                        self.out.clear();
+                        return Ok(());
+                    }
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// A vertex or normal: finite, without colours.
+    fn vector(&mut self, text: &str, is_vertex: bool) -> Result<(), String> {
+        for word in text.split_whitespace().skip(1).take(3) {
+            let lower = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
+            let named = lower.starts_with("nan") || lower.starts_with("inf") || lower.contains('#');
+            if named || word.parse::<f64>().is_ok_and(|v| !v.is_finite()) {
+                let what = if is_vertex { "vertex" } else { "normal" };
+                return Err(format!("a {what} that is not finite in `{}`; mend it or export again", shown(text)));
+            }
+        }
+        if is_vertex {
+            self.vertices += 1;
+        } else {
+            self.normals += 1;
+        }
+        // x y z r g b, as scanners write it; six numbers or more.
+        let keep = if is_vertex && text.split_whitespace().nth(6).is_some() { 4 } else { usize::MAX };
+        for word in text.split_whitespace().take(keep) {
+            self.out.push_str(word);
+            self.out.push(' ');
+        }
+        self.out.push('\n');
+        Ok(())
+    }
+
+    /// A face with absolute indices, `v` or `v//vn`.
+    fn face(&mut self, text: &str) -> Result<(), String> {
+        let malformed =
+            || format!("no face in `{}`; expected `f` and vertex numbers v, v/vt, v//vn or v/vt/vn", shown(text));
+        let corners = text.split_whitespace().skip(1).map(|word| {
+            let mut parts = word.split('/');
+            let mut part = || match parts.next() {
+                None | Some("") => Ok(None),
+                Some(number) => number.parse::<i64>().map(Some).map_err(|_| malformed()),
+            };
+            let (v, _, vn) = (part()?.ok_or_else(malformed)?, part()?, part()?);
+            if parts.next().is_some() {
+                return Err(malformed());
+            }
+            Ok((v, vn))
+        });
+        let corners = corners.collect::<Result<Vec<_>, String>>()?;
+        if corners.is_empty() {
+            return Err(malformed());
+        }
+        if corners.len() < 3 {
+            self.ignored += 1;
+            return Ok(());
+        }
+        let with_normals = corners.iter().all(|(_, vn)| vn.is_some());
+        let mut out = std::mem::take(&mut self.out);
+        out.push('f');
+        for (v, vn) in &corners {
+            let v = self.resolve(0, *v)?;
+            out.push_str(&format!(" {v}"));
+            if let Some(vn) = *vn
+                && with_normals
+            {
+                let vn = self.resolve(1, vn)?;
+                out.push_str(&format!("//{vn}"));
+            }
+        }
+        out.push('\n');
+        self.out = out;
+        self.has_normals.resize(self.has_normals.len() + corners.len() - 2, with_normals);
+        Ok(())
+    }
+
+    /// The absolute index, from 1, of a typed one.
+    fn resolve(&mut self, kind: usize, typed: i64) -> Result<usize, String> {
+        let (name, count) = [("vertex", self.vertices), ("normal", self.normals)][kind];
+        let index = if typed < 0 { (count as i64).saturating_add(typed).saturating_add(1) } else { typed };
+        if index < 1 || index > i64::from(u32::MAX) {
+            return Err(out_of_range(name, typed, count));
+        }
+        let index = index as usize;
+        if index > count && self.forward[kind].is_none_or(|(largest, _)| index > largest) {
+            self.forward[kind] = Some((index, self.line));
+        }
+        Ok(index)
+    }
+}
+
+fn out_of_range(name: &str, typed: i64, count: usize) -> String {
+    if typed == 0 {
+        return format!("{name} number 0 in a face; OBJ counts from 1");
+    }
+    format!("{name} number {typed} in a face, but there are {count}; export again, or mend the number")
+}
+
+impl<R: BufRead> Read for ObjLines<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let available = self.fill_buf()?;
+        let n = available.len().min(into.len());
+        into[..n].copy_from_slice(&available[..n]);
+        self.consume(n);
+        Ok(n)
+    }
+}
+
+impl<R: BufRead> BufRead for ObjLines<R> {
+    fn fill_buf(&mut self) -> io::Result<&[u8]> {
+        if self.taken == self.out.len()
+            && self.complaint.is_none()
+            && self.failed.is_none()
+            && let Err(e) = self.advance()
+        {
+            self.failed = Some(e);
+        }
+        Ok(&self.out.as_bytes()[self.taken..])
+    }
+
+    fn consume(&mut self, n: usize) {
+        self.taken += n;
+    }
+}

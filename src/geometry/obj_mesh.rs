@@ -1,0 +1,130 @@
+//! A mesh in f64 as it is typed or made, on its way into a scene: placed, turned inside out, given smooth normals,
+//! moved to the scene's centre and only then rounded to f32.
+
+use glam::DMat3;
+use std::collections::HashMap;
+
+use super::{Mesh, Normals};
+use crate::math::{DVec3, Vec3};
+
+/// What an OBJ file or a shape holds, before any transform.
+#[derive(Clone, Debug, Default)]
+pub struct ObjMesh {
+    /// Positions as typed.
+    pub positions: Vec<DVec3>,
+    /// Indices into `positions`, three a triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Normals, where there are any.
+    pub normals: Option<ObjNormals>,
+    /// Points, lines and faces with fewer than three corners that the file had besides.
+    pub ignored: usize,
+}
+
+/// Normals with indices of their own; a triangle may be without.
+#[derive(Clone, Debug, Default)]
+pub struct ObjNormals {
+    /// Unit vectors.
+    pub vectors: Vec<DVec3>,
+    /// One entry for each triangle of the mesh; `None` shades it with its own normal.
+    pub triangles: Vec<Option<[u32; 3]>>,
+}
+
+impl ObjMesh {
+    /// Smallest and largest corner of the box around all vertices; `None` without vertices.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let first = *self.positions.first()?;
+        Some(self.positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p))))
+    }
+
+    /// Triangles that lack normals while others have them.
+    pub fn without_normals(&self) -> usize {
+        self.normals.as_ref().map_or(0, |n| n.triangles.iter().filter(|t| t.is_none()).count())
+    }
+
+    /// Applies x -> `linear` x + `translate`. A mirroring map also turns the triangles' winding, so that the outside
+    /// stays outside; normals follow the inverse transpose. `linear` must have an inverse.
+    #[must_use]
+    pub fn placed(mut self, linear: DMat3, translate: DVec3) -> Self {
+        for p in &mut self.positions {
+            *p = linear * *p + translate;
+        }
+        if let Some(normals) = &mut self.normals {
+            let inverse_transpose = linear.inverse().transpose();
+            for n in &mut normals.vectors {
+                *n = (inverse_transpose * *n).normalize_or_zero();
+            }
+        }
+        if linear.determinant() < 0.0 {
+            self.turn_winding();
+        }
+        self
+    }
+
+    /// The same surface with inside and outside exchanged.
+    #[must_use]
+    pub fn flipped(mut self) -> Self {
+        self.turn_winding();
+        if let Some(normals) = &mut self.normals {
+            normals.vectors.iter_mut().for_each(|n| *n = -*n);
+        }
+        self
+    }
+
+    fn turn_winding(&mut self) {
+        self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        if let Some(normals) = &mut self.normals {
+            normals.triangles.iter_mut().flatten().for_each(|t| t.swap(1, 2));
+        }
+    }
+
+    /// Normals computed anew: at each position the mean of the normals of the triangles around it, weighted by their
+    /// angles there. Vertices at exactly the same position count as one.
+    #[must_use]
+    pub fn with_smooth_normals(mut self) -> Self {
+        let mut first_at = HashMap::with_capacity(self.positions.len());
+        let welded: Vec<u32> = (0_u32..)
+            .zip(&self.positions)
+            // + 0.0 makes -0 and 0 one position.
+            .map(|(i, p)| *first_at.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert(i))
+            .collect();
+        let mut vectors = vec![DVec3::ZERO; self.positions.len()];
+        for t in &self.triangles {
+            let p = t.map(|i| self.positions[i as usize]);
+            let n = (p[1] - p[0]).cross(p[2] - p[0]).normalize_or_zero();
+            for corner in 0..3 {
+                let (u, v) = (p[(corner + 1) % 3] - p[corner], p[(corner + 2) % 3] - p[corner]);
+                vectors[welded[t[corner] as usize] as usize] += n * u.cross(v).length().atan2(u.dot(v));
+            }
+        }
+        vectors.iter_mut().for_each(|n| *n = n.normalize_or_zero());
+        let triangles = self.triangles.iter().map(|t| {
+            let t = t.map(|i| welded[i as usize]);
+            t.iter().all(|&i| vectors[i as usize] != DVec3::ZERO).then_some(t)
+        });
+        self.normals = Some(ObjNormals { triangles: triangles.collect(), vectors });
+        self
+    }
+
+    /// The mesh relative to `centre`, rounded to f32. Positions that f32 cannot hold become infinite: check them.
+    pub fn recentred(&self, centre: DVec3) -> Mesh {
+        let mut mesh = Mesh {
+            positions: self.positions.iter().map(|p| (*p - centre).as_vec3()).collect(),
+            triangles: self.triangles.clone(),
+            normals: None,
+        };
+        mesh.normals = self.normals.as_ref().map(|normals| {
+            let mut vectors: Vec<Vec3> = normals.vectors.iter().map(|n| n.as_vec3().normalize_or(Vec3::Z)).collect();
+            let triangles = (0_u32..)
+                .zip(&normals.triangles)
+                .map(|(t, given)| {
+                    given.unwrap_or_else(|| {
+                        vectors.push(mesh.geometric_normal(t).normalize_or(Vec3::Z));
+                        [vectors.len() as u32 - 1; 3]
+                    })
+                })
+                .collect();
+            Normals { vectors, triangles }
+        });
+        mesh
+    }
+}

@@ -1,0 +1,246 @@
+//! What can be typed: one struct a section, every number checked alone. What needs meshes is checked in `load.rs`.
+
+use std::path::{Path, PathBuf};
+
+use super::materials::{self, MaterialEntry};
+use super::objects::{self, ObjectEntry};
+use super::options::{MethodOptions, RenderOptions, named};
+use super::tree::{Fields, Node};
+use crate::error::{Error, Result, did_you_mean};
+use crate::math::{DVec3, Rgb};
+
+/// A scene file whose numbers are in range and whose names exist. docs/scene-format.md lists every key.
+#[derive(Clone, Debug)]
+pub struct SceneFile {
+    /// Where it was read from; meshes are looked for beside it.
+    pub path: PathBuf,
+    /// Length of one unit [mm]; `None` if the file does not say.
+    pub unit_in_mm: Option<f64>,
+    /// `[camera]`.
+    pub camera: CameraEntry,
+    /// `[[object]]`, in order.
+    pub objects: Vec<ObjectEntry>,
+    /// `[material.NAME]`, in order.
+    pub materials: Vec<MaterialEntry>,
+    /// `[environment]` radiance; black without one.
+    pub environment: Rgb,
+    /// `[method]`.
+    pub method: MethodOptions,
+    /// `[render]`.
+    pub render: RenderOptions,
+    root: Node,
+}
+
+/// `[camera]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraEntry {
+    /// Pinhole [unit].
+    pub position: DVec3,
+    /// A point in the middle of the picture [unit].
+    pub look_at: DVec3,
+    /// Upwards in the picture, of any length; need not be orthogonal to the view.
+    pub up: DVec3,
+    /// Full angle of view [degrees], in (0, 180).
+    pub fov: f64,
+    /// The side of the picture that `fov` spans.
+    pub fov_axis: FovAxis,
+    /// Pixels across and down, 1 to 65536 each.
+    pub resolution: [u32; 2],
+}
+
+named! {
+    /// A side of the picture.
+    FovAxis, "side of the picture",
+    /// Bottom to top.
+    Vertical = "vertical",
+    /// Left to right.
+    Horizontal = "horizontal",
+    /// Whichever has fewer pixels.
+    Smaller = "smaller"
+}
+
+/// Known units and their length in mm.
+const UNITS: &[(&str, f64)] =
+    &[("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3), ("km", 1e6), ("in", 25.4), ("ft", 304.8)];
+
+const SECTIONS: &[&str] = &["unit", "camera", "object", "material", "environment", "method", "render"];
+
+impl SceneFile {
+    /// Reads and checks a scene file; meshes are not opened yet.
+    ///
+    /// # Errors
+    /// A file error if it cannot be read; else a scene error that names the line, the key, what is expected.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
+        let text = String::from_utf8(text).map_err(|e| {
+            let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
+            Error::scene(format!("{}:{line}: not UTF-8 text; a scene file is TOML", path.display()))
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// The same from text; `path` is for messages and for the folder of meshes.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        Self::from_tree(Node::parse(text, path)?, path)
+    }
+
+    /// The file with options of the form `path.to.key=value` put over it, in order; lists count from 0
+    /// (`object.0.material=marble`). A value that is no TOML is taken as text.
+    ///
+    /// # Errors
+    /// A usage error if the form or a list's number is wrong; a scene error, naming the option, if the value is.
+    pub fn with<S: AsRef<str>>(&self, overrides: &[S]) -> Result<Self> {
+        let mut root = self.root.clone();
+        for typed in overrides {
+            root.set(typed.as_ref())?;
+        }
+        Self::from_tree(root, &self.path)
+    }
+
+    /// The scene as asked, overrides folded in, as TOML; for file headers.
+    pub fn effective(&self) -> String {
+        toml::to_string(&self.root.to_toml()).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
+    }
+
+    fn from_tree(root: Node, path: &Path) -> Result<Self> {
+        let top = Fields::open(path, String::new(), &root)?;
+        top.only("a scene", SECTIONS)?;
+        let unit_in_mm = top.get("unit", UNIT, unit)?;
+        let materials = materials::read(&top, unit_in_mm)?;
+        let file = Self {
+            path: path.to_path_buf(),
+            unit_in_mm,
+            camera: camera(&top)?,
+            objects: objects::read(&top, &materials)?,
+            environment: environment(&top)?,
+            method: method(&top)?,
+            render: render(&top)?,
+            materials,
+            root: root.clone(),
+        };
+        Ok(file)
+    }
+}
+
+/// What [`unit`] takes.
+pub(super) const UNIT: &str = "\"um\", \"mm\", \"cm\", \"m\", \"km\", \"in\", \"ft\" or a number of mm above 0";
+
+/// A unit of length in mm.
+pub(super) fn unit(node: &Node) -> Option<f64> {
+    match node.text() {
+        Some(name) => UNITS.iter().find(|(known, _)| *known == name).map(|(_, mm)| *mm),
+        None => node.number().filter(|mm| mm.is_normal() && *mm > 0.0),
+    }
+}
+
+/// Three numbers.
+pub(super) fn vector(node: &Node) -> Option<DVec3> {
+    node.numbers::<3>().map(DVec3::from_array)
+}
+
+/// One number for all channels, or three; each finite in f32 and accepted by `within`.
+pub(super) fn colour(node: &Node, within: impl Fn(f64) -> bool) -> Option<[f64; 3]> {
+    let rgb = node.number().map(|v| [v; 3]).or_else(|| node.numbers::<3>())?;
+    rgb.iter().all(|&v| within(v) && (v as f32).is_finite()).then_some(rgb)
+}
+
+/// Rounded once.
+pub(super) fn rgb(value: [f64; 3]) -> Rgb {
+    Rgb(value.map(|v| v as f32))
+}
+
+/// A name of an enum, with the enum's own complaint and hint.
+pub(super) fn named_value<T: std::str::FromStr<Err = Error>>(fields: &Fields<'_>, key: &str) -> Result<Option<T>> {
+    let Some(name) = fields.get(key, "a name in quotes", Node::text)? else { return Ok(None) };
+    name.parse().map(Some).map_err(|e: Error| fields.error_at(key, format_args!("is wrong: {e}")))
+}
+
+/// `name` among `known`, or the complaint with the nearest one.
+pub(super) fn unknown(name: &str, known: &[&str]) -> String {
+    format!("{name:?} does not exist{}; there are {}", did_you_mean(name, known.iter().copied()), known.join(", "))
+}
+
+fn camera(top: &Fields<'_>) -> Result<CameraEntry> {
+    let expected = "a [camera] with position, look_at, fov and resolution";
+    let c = top.table("camera")?.ok_or_else(|| top.missing("camera", expected))?;
+    c.only("[camera]", &["position", "look_at", "up", "fov", "fov_axis", "resolution"])?;
+    let point = "three numbers [x, y, z]";
+    let side = |v: f64| (1.0..=65536.0).contains(&v) && v.fract() == 0.0;
+    let camera = CameraEntry {
+        position: c.need("position", point, vector)?,
+        look_at: c.need("look_at", point, vector)?,
+        up: c
+            .get("up", "three numbers [x, y, z], not all 0", |n| vector(n).filter(|v| *v != DVec3::ZERO))?
+            .unwrap_or(DVec3::Y),
+        fov: c.need("fov", "degrees above 0 and below 180", |n| n.number().filter(|v| *v > 0.0 && *v < 180.0))?,
+        fov_axis: named_value(&c, "fov_axis")?.unwrap_or(FovAxis::Vertical),
+        resolution: c.need("resolution", "[width, height], each a whole number from 1 to 65536", |n| {
+            n.numbers::<2>().filter(|wh| wh.iter().all(|v| side(*v))).map(|wh| wh.map(|v| v as u32))
+        })?,
+    };
+    let view = unit_vector(camera.look_at - camera.position).ok_or_else(|| {
+        c.error_at("look_at", "is the same point as `camera.position`; expected a point in front of the camera")
+    })?;
+    let aside = unit_vector(camera.up).map_or(0.0, |up| up.cross(view).length());
+    if aside < 1e-6 {
+        return Err(c.error_at(
+            if c.has("up") { "up" } else { "look_at" },
+            format_args!("leaves the view parallel to up ({}); set `up` to another direction", camera.up),
+        ));
+    }
+    Ok(camera)
+}
+
+/// The direction of `v`, whatever its length; `None` for zero.
+pub(super) fn unit_vector(v: DVec3) -> Option<DVec3> {
+    (v / v.abs().max_element()).try_normalize()
+}
+
+fn environment(top: &Fields<'_>) -> Result<Rgb> {
+    let Some(e) = top.table("environment")? else { return Ok(Rgb::BLACK) };
+    e.only("[environment]", &["radiance"])?;
+    e.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0)).map(rgb)
+}
+
+/// What a radiance is.
+pub(super) const RADIANCE: &str = "one number or three, none negative";
+
+fn whole(fields: &Fields<'_>, key: &str, largest: u32) -> Result<Option<u32>> {
+    let expected = format!("a whole number from 1 to {largest}");
+    fields.get(key, &expected, |n| n.integer().filter(|i| (1..=i64::from(largest)).contains(i)).map(|i| i as u32))
+}
+
+/// `true` or `false`.
+pub(super) fn switch(fields: &Fields<'_>, key: &str) -> Result<Option<bool>> {
+    fields.get(key, "true or false", |n| if let super::tree::Value::Bool(b) = n.value { Some(b) } else { None })
+}
+
+fn method(top: &Fields<'_>) -> Result<MethodOptions> {
+    let Some(m) = top.table("method")? else { return Ok(MethodOptions::default()) };
+    let keys = ["name", "radius", "rays", "light_samples", "cache_samples", "estimator", "model", "entry", "specular"];
+    m.only("[method]", &keys)?;
+    Ok(MethodOptions {
+        name: named_value(&m, "name")?,
+        radius: m.get("radius", "a length above 0", |n| n.number().filter(|v| *v > 0.0))?,
+        rays: whole(&m, "rays", 1 << 16)?,
+        light_samples: whole(&m, "light_samples", 1 << 16)?,
+        cache_samples: whole(&m, "cache_samples", 1 << 24)?,
+        estimator: named_value(&m, "estimator")?,
+        model: named_value(&m, "model")?,
+        entry: named_value(&m, "entry")?,
+        specular: switch(&m, "specular")?,
+    })
+}
+
+fn render(top: &Fields<'_>) -> Result<RenderOptions> {
+    let Some(r) = top.table("render")? else { return Ok(RenderOptions::default()) };
+    r.only("[render]", &["spp", "seed", "exposure"])?;
+    Ok(RenderOptions {
+        spp: whole(&r, "spp", 1 << 24)?,
+        seed: r.get("seed", "a whole number, not negative", |n| n.integer().and_then(|i| u64::try_from(i).ok()))?,
+        exposure: r.get("exposure", "stops from -64 to 64", |n| n.number().filter(|v| v.abs() <= 64.0))?,
+    })
+}

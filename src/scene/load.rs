@@ -1,0 +1,157 @@
+//! The way from the file as typed to the checked world: meshes read, placed and recentred in f64, then rounded.
+
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::rc::Rc;
+
+use super::file::{FovAxis, SceneFile, unit_vector};
+use super::objects::{Geometry, NormalsChoice, ObjectEntry};
+use super::{Camera, Material, Object, Scene, Surface, warnings};
+use crate::error::{Error, Result};
+use crate::geometry::{Mesh, ObjMesh, load_obj, rectangle, sphere};
+use crate::math::{DVec3, Vec3};
+
+impl Scene {
+    /// Reads the meshes of a scene file (each OBJ once) and makes the world from them. What is odd but can be
+    /// rendered is in [`Scene::warnings`].
+    ///
+    /// # Errors
+    /// A file error if a mesh cannot be read; a scene error if one is malformed or has no place in single precision.
+    pub fn load(file: &SceneFile) -> Result<Self> {
+        let mut said = Vec::new();
+        let placed = meshes(file, &mut said)?;
+        let centre = centre(&placed);
+        let mut objects = Vec::with_capacity(placed.len());
+        for (entry, mesh) in file.objects.iter().zip(placed) {
+            let mesh = mesh.recentred(centre);
+            if let Some(p) = mesh.positions.iter().find(|p| !p.is_finite()) {
+                let what = format!("object {:?}: a vertex ({p}) is too far out for single precision", entry.name);
+                return Err(Error::scene(format!("{}: {what}; use a larger `unit` or a smaller `scale`", entry.at)));
+            }
+            objects.push(Object { name: entry.name.clone(), mesh, material: entry.material });
+        }
+        let mut scene = Self {
+            name: file.path.display().to_string(),
+            unit_in_mm: file.unit_in_mm,
+            centre,
+            camera: camera(file, centre)?,
+            objects,
+            materials: materials(file),
+            environment: file.environment,
+            warnings: Vec::new(),
+        };
+        said.extend(warnings::of(file, &scene));
+        scene.warnings = said;
+        Ok(scene)
+    }
+
+    /// All meshes, in the order of [`Scene::objects`]; what a ray backend is built from.
+    pub fn meshes(&self) -> Vec<&Mesh> {
+        self.objects.iter().map(|o| &o.mesh).collect()
+    }
+}
+
+/// The objects' meshes in the scene's space, in f64.
+fn meshes(file: &SceneFile, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
+    let folder = file.path.parent().map(PathBuf::from).unwrap_or_default();
+    let mut read: HashMap<PathBuf, Rc<ObjMesh>> = HashMap::new();
+    let mut out = Vec::with_capacity(file.objects.len());
+    for entry in &file.objects {
+        let mesh = match &entry.geometry {
+            Geometry::Rectangle { centre, edge_u, edge_v } => rectangle(*centre, *edge_u, *edge_v),
+            Geometry::Sphere { centre, radius, rings, segments } => sphere(*centre, *radius, *rings, *segments),
+            Geometry::Mesh(path) => {
+                let path = folder.join(path);
+                let mesh = match read.get(&path) {
+                    Some(mesh) => Rc::clone(mesh),
+                    None => {
+                        let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
+                        let mesh = Rc::new(load_obj(&path).map_err(within)?);
+                        if mesh.ignored > 0 {
+                            said.push(format!(
+                                "{}: {} points, lines or faces with fewer than three corners are left out",
+                                path.display(),
+                                mesh.ignored
+                            ));
+                        }
+                        read.insert(path, Rc::clone(&mesh));
+                        mesh
+                    }
+                };
+                mesh.as_ref().clone()
+            }
+        };
+        out.push(place(entry, mesh, said));
+    }
+    Ok(out)
+}
+
+fn place(entry: &ObjectEntry, mut mesh: ObjMesh, said: &mut Vec<String>) -> ObjMesh {
+    if entry.normals != NormalsChoice::Auto {
+        mesh.normals = None;
+    }
+    let (bare, all) = (mesh.without_normals(), mesh.triangles.len());
+    if bare > 0 {
+        said.push(format!(
+            "{}: object {:?}: {bare} of {all} triangles have no normals in the file and are shaded flat; set `normals`",
+            entry.at, entry.name
+        ));
+    }
+    mesh = mesh.placed(entry.transform.linear, entry.transform.translate);
+    if entry.flip {
+        mesh = mesh.flipped();
+    }
+    // After the transform: a stretch changes the angles.
+    if entry.normals == NormalsChoice::Smooth { mesh.with_smooth_normals() } else { mesh }
+}
+
+/// Middle of the box around everything; halved before it is added, so that it cannot overflow.
+fn centre(meshes: &[ObjMesh]) -> DVec3 {
+    meshes
+        .iter()
+        .filter_map(ObjMesh::bounds)
+        .reduce(|(lo, hi), (other_lo, other_hi)| (lo.min(other_lo), hi.max(other_hi)))
+        .map_or(DVec3::ZERO, |(lo, hi)| 0.5 * lo + 0.5 * hi)
+}
+
+fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {
+    let c = &file.camera;
+    let [width, height] = c.resolution.map(f64::from);
+    let tangent = (0.5 * c.fov).to_radians().tan();
+    let vertical = match c.fov_axis {
+        FovAxis::Vertical => true,
+        FovAxis::Horizontal => false,
+        FovAxis::Smaller => height <= width,
+    };
+    let (half_width, half_height) =
+        if vertical { (tangent * width / height, tangent) } else { (tangent, tangent * height / width) };
+    let single = |v: DVec3| unit_vector(v).unwrap_or(DVec3::ZERO).as_vec3();
+    let origin = (c.position - centre).as_vec3();
+    let built: Option<Camera> = Camera::new(
+        c.resolution,
+        origin,
+        single(c.look_at - c.position),
+        single(c.up),
+        half_width as f32,
+        half_height as f32,
+    );
+    built
+        .filter(|_| origin.is_finite() && Vec3::new(half_width as f32, half_height as f32, 0.0).is_finite())
+        .ok_or_else(|| {
+            Error::scene(format!(
+                "{}: `camera` cannot be held in single precision; bring it nearer",
+                file.path.display()
+            ))
+        })
+}
+
+fn materials(file: &SceneFile) -> Vec<Material> {
+    let made = file.materials.iter().map(|m| {
+        let mut surface = m.surface.clone();
+        if let (Surface::Translucent(t), Some(model)) = (&mut surface, file.method.model) {
+            t.model = model;
+        }
+        Material { name: m.name.clone(), surface }
+    });
+    made.collect()
+}

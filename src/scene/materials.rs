@@ -1,0 +1,139 @@
+//! `[material.NAME]` as typed.
+
+use super::file::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
+use super::tree::{Fields, Node};
+use super::{Surface, Translucent};
+use crate::bssrdf::ModelName;
+use crate::error::Result;
+use crate::math::Rgb;
+use crate::optics::{self, Medium};
+
+/// One material, its coefficients already per scene unit.
+#[derive(Clone, Debug)]
+pub struct MaterialEntry {
+    /// Name in the scene file.
+    pub name: String,
+    /// The kind and its numbers.
+    pub surface: Surface,
+    /// File and line, for messages.
+    pub at: String,
+}
+
+const KINDS: &[&str] = &["translucent", "diffuse", "emissive"];
+const COEFFICIENT: &str = "one number or three in 1/unit, none negative";
+const G: &str = "a number above -1 and below 1";
+const ETA: &str = "n_inside / n_outside, a number above 0";
+
+/// All materials; `unit_in_mm` is the scene's, millimetres if it does not say.
+pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<MaterialEntry>> {
+    let Some(table) = top.table("material")? else { return Ok(Vec::new()) };
+    let entries = table.tables().map(|entry| {
+        let (name, m) = entry?;
+        let kind = m.need("type", "\"translucent\", \"diffuse\" or \"emissive\"", Node::text)?;
+        let surface = match kind {
+            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0))?,
+            "diffuse" => {
+                m.only("a diffuse material", &["type", "albedo"])?;
+                let expected = "one number or three from 0 to 1";
+                let albedo = m.need("albedo", expected, |n| colour(n, |v| (0.0..=1.0).contains(&v)))?;
+                Surface::Diffuse { albedo: rgb(albedo) }
+            }
+            "emissive" => {
+                m.only("an emissive material", &["type", "radiance", "two_sided"])?;
+                let radiance = m.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0))?;
+                Surface::Emissive { radiance: rgb(radiance), two_sided: switch(&m, "two_sided")?.unwrap_or(false) }
+            }
+            "dielectric" | "mirror" => {
+                let what = format!("{kind:?} is not built yet; there are {}", KINDS.join(", "));
+                return Err(m.error_at("type", what));
+            }
+            other => return Err(m.error_at("type", unknown(other, KINDS))),
+        };
+        Ok(MaterialEntry { name: name.to_string(), surface, at: m.at() })
+    });
+    entries.collect()
+}
+
+fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
+    let keys = [
+        "type",
+        "preset",
+        "sigma_s_prime",
+        "sigma_s",
+        "sigma_a",
+        "g",
+        "eta",
+        "per",
+        "scale",
+        "model",
+        "exit_normalisation",
+    ];
+    m.only("a translucent material", &keys)?;
+    let scale = m.get("scale", "a number above 0", |n| n.number().filter(|v| *v > 0.0))?.unwrap_or(1.0);
+    let eta = m.get("eta", ETA, |n| n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0))?;
+    let (mut medium, source) = match m.get("preset", "the name of a measured medium", Node::text)? {
+        Some(name) => preset(m, name, unit_in_mm)?,
+        None => (numbers(m, unit_in_mm, eta)?, m.at()),
+    };
+    if let Some(eta) = eta {
+        medium.eta = eta as f32;
+    }
+    if scale != 1.0 {
+        let scaled = |c: Rgb| c.map(|v| (f64::from(v) * scale) as f32);
+        (medium.sigma_a, medium.sigma_s) = (scaled(medium.sigma_a), scaled(medium.sigma_s));
+    }
+    if !medium.sigma_t_prime().is_finite() || !medium.sigma_s.is_finite() {
+        return Err(
+            m.error("the coefficients are too large for single precision once in 1/unit; see `per` and `scale`")
+        );
+    }
+    Ok(Surface::Translucent(Translucent {
+        medium,
+        model: named_value(m, "model")?.unwrap_or(ModelName::Standard),
+        exit_normalisation: switch(m, "exit_normalisation")?.unwrap_or(true),
+        source,
+    }))
+}
+
+fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64) -> Result<(Medium, String)> {
+    for key in ["sigma_s_prime", "sigma_s", "sigma_a", "g", "per"] {
+        if m.has(key) {
+            return Err(
+                m.error_at(key, "stands beside `preset`, which has its own; remove one (`eta` and `scale` may stay)")
+            );
+        }
+    }
+    let measured = optics::find(name).ok_or_else(|| {
+        let known: Vec<&str> = optics::CATALOGUE.iter().map(|m| m.name).collect();
+        m.error_at("preset", unknown(name, &known))
+    })?;
+    Ok((measured.medium(unit_in_mm), format!("{name} [{}]", measured.source)))
+}
+
+/// A medium from coefficients; without a preset none of them has a default, except that reduced scattering may come
+/// without `g`.
+fn numbers(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> {
+    let coefficient = |n: &Node| colour(n, |v| v >= 0.0);
+    let per = m.get("per", UNIT, unit)?;
+    let (reduced, full) =
+        (m.get("sigma_s_prime", COEFFICIENT, coefficient)?, m.get("sigma_s", COEFFICIENT, coefficient)?);
+    let g = m.get("g", G, |n| n.number().filter(|v| *v > -1.0 && *v < 1.0 && (*v as f32).abs() < 1.0))?;
+    let (sigma_s, g) = match (reduced, full, g) {
+        (Some(_), Some(_), _) => {
+            return Err(m.error_at("sigma_s", "stands beside `sigma_s_prime`, which is sigma_s (1 - g); remove one"));
+        }
+        (Some(reduced), None, g) => {
+            let g = g.unwrap_or(0.0);
+            (reduced.map(|v| v / (1.0 - g)), g)
+        }
+        (None, Some(full), Some(g)) => (full, g),
+        (None, Some(_), None) => return Err(m.missing("g", &format!("{G}, beside `sigma_s`"))),
+        (None, None, _) => {
+            return Err(m.missing("sigma_s_prime", &format!("{COEFFICIENT}; or `sigma_s` and `g`, or a `preset`")));
+        }
+    };
+    let sigma_a = m.need("sigma_a", COEFFICIENT, coefficient)?;
+    let eta = eta.ok_or_else(|| m.missing("eta", ETA))?;
+    let per_unit = |v: [f64; 3]| rgb(v.map(|v| per.map_or(v, |per| v * (unit_in_mm / per))));
+    Ok(Medium { sigma_a: per_unit(sigma_a), sigma_s: per_unit(sigma_s), g: g as f32, eta: eta as f32 })
+}

@@ -1,0 +1,219 @@
+//! `[[object]]` as typed.
+
+use glam::DMat3;
+use std::path::PathBuf;
+
+use super::file::{named_value, switch, unknown, vector};
+use super::materials::MaterialEntry;
+use super::options::named;
+use super::tree::{Fields, Node, Value};
+use crate::error::Result;
+use crate::math::DVec3;
+
+/// One object.
+#[derive(Clone, Debug)]
+pub struct ObjectEntry {
+    /// Name, for messages; unlike any other object's.
+    pub name: String,
+    /// Where its triangles come from.
+    pub geometry: Geometry,
+    /// Index into the file's materials.
+    pub material: usize,
+    /// Which shading normals.
+    pub normals: NormalsChoice,
+    /// Exchange inside and outside.
+    pub flip: bool,
+    /// From its own space into the scene's.
+    pub transform: Transform,
+    /// File and line, for messages.
+    pub at: String,
+}
+
+/// Where triangles come from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// An OBJ file, as typed: relative to the scene file.
+    Mesh(PathBuf),
+    /// See [`crate::geometry::rectangle`].
+    Rectangle {
+        /// Middle [unit].
+        centre: DVec3,
+        /// Half of one edge [unit].
+        edge_u: DVec3,
+        /// Half of the other [unit]; the outside is where `edge_u` x `edge_v` points.
+        edge_v: DVec3,
+    },
+    /// See [`crate::geometry::sphere`].
+    Sphere {
+        /// Middle [unit].
+        centre: DVec3,
+        /// Distance of the vertices from it [unit], > 0.
+        radius: f64,
+        /// Bands from pole to pole, 2 to 4096.
+        rings: u32,
+        /// Triangles around, 3 to 8192.
+        segments: u32,
+    },
+}
+
+/// x -> `linear` x + `translate`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transform {
+    /// Scale and rotation, with an inverse.
+    pub linear: DMat3,
+    /// Shift [unit].
+    pub translate: DVec3,
+}
+
+named! {
+    /// Which shading normals a mesh gets.
+    NormalsChoice, "kind of normals",
+    /// The file's where it has any, else the triangles' own.
+    Auto = "auto",
+    /// The triangles' own: flat.
+    Geometric = "geometric",
+    /// Computed: the mean about each position, weighted by angle.
+    Smooth = "smooth"
+}
+
+const COMMON: [&str; 7] = ["name", "mesh", "shape", "material", "normals", "flip", "transform"];
+
+/// All objects.
+pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<ObjectEntry>> {
+    let list = top.list("object")?;
+    if list.is_empty() {
+        return Err(top.missing("object", "at least one [[object]]"));
+    }
+    let mut out: Vec<ObjectEntry> = Vec::with_capacity(list.len());
+    for (i, o) in list.iter().enumerate() {
+        let geometry = geometry(o)?;
+        let name = o.get("name", "a name in quotes", Node::text)?.map_or_else(|| format!("object {i}"), String::from);
+        if let Some(other) = out.iter().find(|other| other.name == name) {
+            return Err(o.error_at("name", format_args!("{name:?} is taken ({}); give each object its own", other.at)));
+        }
+        let asked = o.need("material", "the name of a [material.NAME]", Node::text)?;
+        let material = materials.iter().position(|m| m.name == asked).ok_or_else(|| {
+            let known: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+            let what = if known.is_empty() {
+                format!("{asked:?} does not exist; add a section [material.{asked}]")
+            } else {
+                unknown(asked, &known)
+            };
+            o.error_at("material", what)
+        })?;
+        out.push(ObjectEntry {
+            name,
+            geometry,
+            material,
+            normals: named_value(o, "normals")?.unwrap_or(NormalsChoice::Auto),
+            flip: switch(o, "flip")?.unwrap_or(false),
+            transform: transform(o)?,
+            at: o.at(),
+        });
+    }
+    Ok(out)
+}
+
+fn geometry(o: &Fields<'_>) -> Result<Geometry> {
+    const MESH: &str = "the path of an OBJ file, relative to the scene file";
+    const SHAPES: &[&str] = &["rectangle", "sphere"];
+    let keys = |more: &[&'static str]| [&COMMON[..], more].concat();
+    let shape = o.get("shape", "\"rectangle\" or \"sphere\"", Node::text)?;
+    if o.has("mesh") && o.has("shape") {
+        return Err(o.error_at("shape", "stands beside `mesh`; remove one"));
+    }
+    let point = "three numbers [x, y, z]";
+    match shape {
+        None => {
+            o.only("an object with a mesh", &keys(&[]))?;
+            let mesh = o.need("mesh", &format!("{MESH}; or a `shape`"), |n| n.text().filter(|t| !t.is_empty()))?;
+            Ok(Geometry::Mesh(mesh.into()))
+        }
+        Some("rectangle") => {
+            o.only("a rectangle", &keys(&["centre", "edge_u", "edge_v"]))?;
+            let [centre, edge_u, edge_v] =
+                [o.need("centre", point, vector)?, o.need("edge_u", point, vector)?, o.need("edge_v", point, vector)?];
+            Ok(Geometry::Rectangle { centre, edge_u, edge_v })
+        }
+        Some("sphere") => {
+            o.only("a sphere", &keys(&["centre", "radius", "rings", "segments"]))?;
+            let count = |key: &str, low: i64, high: i64, default: u32| {
+                let expected = format!("a whole number from {low} to {high}");
+                let value = o.get(key, &expected, |n| n.integer().filter(|i| (low..=high).contains(i)));
+                value.map(|v| v.map_or(default, |i| i as u32))
+            };
+            Ok(Geometry::Sphere {
+                centre: o.need("centre", point, vector)?,
+                radius: o.need("radius", "a length above 0", |n| n.number().filter(|v| *v > 0.0))?,
+                rings: count("rings", 2, 4096, 64)?,
+                segments: count("segments", 3, 8192, 128)?,
+            })
+        }
+        Some(other) => Err(o.error_at("shape", unknown(other, SHAPES))),
+    }
+}
+
+fn transform(o: &Fields<'_>) -> Result<Transform> {
+    let Some(t) = o.table("transform")? else {
+        return Ok(Transform { linear: DMat3::IDENTITY, translate: DVec3::ZERO });
+    };
+    t.only("a transform", &["scale", "rotate", "translate", "matrix"])?;
+    const MATRIX: &str = "3 rows of 3 numbers, or 4 rows of 4 with the last [0, 0, 0, 1]";
+    let transform = if let Some(matrix) = t.get("matrix", MATRIX, matrix)? {
+        if let Some(other) = ["scale", "rotate", "translate"].into_iter().find(|key| t.has(key)) {
+            return Err(t.error_at(other, "stands beside `matrix`, which holds everything; remove one"));
+        }
+        matrix
+    } else {
+        let scale = t.get("scale", "one number or three, none 0", |n| {
+            let v = n.number().map(DVec3::splat).or_else(|| vector(n))?;
+            (v.x != 0.0 && v.y != 0.0 && v.z != 0.0).then_some(v)
+        })?;
+        let rotate = t.get("rotate", "degrees about x, y and z, three numbers", vector)?.unwrap_or(DVec3::ZERO);
+        let linear = about(2, rotate.z) * about(1, rotate.y) * about(0, rotate.x);
+        let translate = t.get("translate", "three numbers [x, y, z]", vector)?.unwrap_or(DVec3::ZERO);
+        Transform { linear: linear * DMat3::from_diagonal(scale.unwrap_or(DVec3::ONE)), translate }
+    };
+    // Each column over its largest entry, so that no scale but only the shape of the map decides.
+    let columns = [transform.linear.x_axis, transform.linear.y_axis, transform.linear.z_axis];
+    let shape = DMat3::from_cols_array_2d(&columns.map(|c| (c / c.abs().max_element()).to_array()));
+    let inverse = transform.linear.inverse();
+    if !(shape.determinant().abs() > 1e-12) || !inverse.is_finite() || transform.linear.determinant() == 0.0 {
+        let key = if t.has("matrix") { "matrix" } else { "scale" };
+        return Err(
+            t.error_at(key, "has no inverse: it flattens the object; expected a map that keeps its volume above 0")
+        );
+    }
+    Ok(transform)
+}
+
+fn matrix(node: &Node) -> Option<Transform> {
+    let Value::List(rows) = &node.value else { return None };
+    if rows.len() == 3 {
+        let [a, b, c] = [rows[0].numbers::<3>()?, rows[1].numbers::<3>()?, rows[2].numbers::<3>()?];
+        return Some(Transform { linear: DMat3::from_cols_array_2d(&[a, b, c]).transpose(), translate: DVec3::ZERO });
+    }
+    if rows.len() != 4 || rows[3].numbers::<4>()? != [0.0, 0.0, 0.0, 1.0] {
+        return None;
+    }
+    let [a, b, c] = [rows[0].numbers::<4>()?, rows[1].numbers::<4>()?, rows[2].numbers::<4>()?];
+    let linear = DMat3::from_cols_array_2d(&[a, b, c].map(|r| [r[0], r[1], r[2]])).transpose();
+    Some(Transform { linear, translate: DVec3::new(a[3], b[3], c[3]) })
+}
+
+/// Rotation by `degrees` about an axis, counter-clockwise seen from its tip; quarter turns are exact.
+fn about(axis: usize, degrees: f64) -> DMat3 {
+    let (s, c) = match degrees.rem_euclid(360.0) {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        other => other.to_radians().sin_cos(),
+    };
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let mut columns = [[0.0; 3]; 3];
+    columns[axis][axis] = 1.0;
+    (columns[u][u], columns[u][v]) = (c, s);
+    (columns[v][u], columns[v][v]) = (-s, c);
+    DMat3::from_cols_array_2d(&columns)
+}

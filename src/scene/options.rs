@@ -1,0 +1,103 @@
+//! What `[method]` and `[render]` may hold; the options of the command line override it.
+
+use crate::bssrdf::ModelName;
+
+/// Makes an enum of names: `ALL`, `name()`, `FromStr` with the nearest name in its message.
+macro_rules! named {
+    ($(#[$doc:meta])* $type:ident, $what:literal, $($(#[$variant_doc:meta])* $variant:ident = $name:literal),+) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub enum $type {
+            $($(#[$variant_doc])* $variant),+
+        }
+
+        impl $type {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+
+            /// The name in scene files and on the command line.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = $crate::error::Error;
+
+            fn from_str(name: &str) -> $crate::error::Result<Self> {
+                Self::ALL.iter().copied().find(|v| v.name() == name).ok_or_else(|| {
+                    let names = Self::ALL.iter().map(|v| v.name());
+                    let hint = $crate::error::did_you_mean(name, names.clone());
+                    let all = names.collect::<Vec<_>>().join(", ");
+                    $crate::error::Error::usage(format!("no {} `{name}`{hint}; there are {all}", $what))
+                })
+            }
+        }
+    };
+}
+pub(super) use named;
+
+named! {
+    /// A method of light transport.
+    MethodName, "method",
+    /// The part of the hemisphere above each point that sees no surface.
+    AmbientOcclusion = "ambient_occlusion",
+    /// Light of area lights on diffuse surfaces.
+    Direct = "direct",
+    /// Light through translucent materials.
+    Subsurface = "subsurface"
+}
+
+named! {
+    /// How the sample cache is summed.
+    Estimator, "estimator",
+    /// The plain loop over all samples with rejection control.
+    Notes = "notes"
+}
+
+named! {
+    /// How the light arriving at a cached sample is found.
+    EntrySampling, "way to sample light at the entry",
+    /// A point on a light.
+    Light = "light",
+    /// A direction by the cosine.
+    Cosine = "cosine",
+    /// Both, weighted by multiple importance sampling.
+    Mixed = "mixed"
+}
+
+/// `[method]`: what is computed. Everything may be absent; the integrator knows the defaults.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MethodOptions {
+    /// Which method.
+    pub name: Option<MethodName>,
+    /// Ambient occlusion: surfaces beyond this distance do not count [unit], > 0.
+    pub radius: Option<f64>,
+    /// Ambient occlusion: rays per camera ray, 1 to 65536.
+    pub rays: Option<u32>,
+    /// Direct light: shadow rays per camera ray, 1 to 65536.
+    pub light_samples: Option<u32>,
+    /// Subsurface: samples per pass and translucent object, 1 to 2^24.
+    pub cache_samples: Option<u32>,
+    /// Subsurface: how the cache is summed.
+    pub estimator: Option<Estimator>,
+    /// Subsurface: the model of every translucent material, over the materials' own.
+    pub model: Option<ModelName>,
+    /// Subsurface: how light is sampled where it enters; by the scene if absent.
+    pub entry: Option<EntrySampling>,
+    /// Subsurface: add the mirror reflection at the boundary.
+    pub specular: Option<bool>,
+}
+
+/// `[render]`: how long and how shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderOptions {
+    /// Samples per pixel, 1 to 2^24.
+    pub spp: Option<u32>,
+    /// Seed of all random numbers, 0 to 2^63 - 1.
+    pub seed: Option<u64>,
+    /// Exposure of the PNG [stops], -64 to 64.
+    pub exposure: Option<f64>,
+}

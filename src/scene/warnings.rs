@@ -1,0 +1,95 @@
+//! Oddities that can be rendered but that a user should hear of, each with its numbers.
+
+use super::file::SceneFile;
+use super::options::MethodName;
+use super::{Scene, Surface, Translucent};
+
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// All of them, in the order of the file.
+pub(super) fn of(file: &SceneFile, scene: &Scene) -> Vec<String> {
+    let mut said = Vec::new();
+    if file.unit_in_mm.is_none() {
+        said.push(format!("{}: no `unit`; millimetres are assumed. Add unit = \"mm\"", file.path.display()));
+    }
+    materials(file, scene, &mut said);
+    objects(file, scene, &mut said);
+    light(file, scene, &mut said);
+    said
+}
+
+fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
+    for (i, entry) in file.materials.iter().enumerate() {
+        let head = format!("{}: material {:?}", entry.at, entry.name);
+        if scene.objects.iter().all(|o| o.material != i) {
+            said.push(format!("{head} is used by no object"));
+        } else if let Surface::Translucent(t) = &entry.surface {
+            said.extend(outside_diffusion(t).map(|what| format!("{head}: {what}")));
+        }
+    }
+}
+
+/// Where the medium leaves the range of diffusion theory.
+fn outside_diffusion(t: &Translucent) -> Option<String> {
+    let (alpha, sigma) = (t.medium.alpha_prime(), t.medium.sigma_t_prime());
+    let empty: Vec<&str> = (0..3).filter(|&c| sigma[c] <= 0.0).map(|c| CHANNELS[c]).collect();
+    if !empty.is_empty() {
+        return Some(format!("no scattering and no absorption in {}: no light comes back there", empty.join(", ")));
+    }
+    let low: Vec<String> =
+        (0..3).filter(|&c| alpha[c] < 0.5).map(|c| format!("{:.3} in {}", alpha[c], CHANNELS[c])).collect();
+    (!low.is_empty()).then(|| {
+        format!("reduced albedo {}, below 0.5: outside diffusion theory, a BSSRDF model errs; trace it", low.join(", "))
+    })
+}
+
+fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
+    for (entry, object) in file.objects.iter().zip(&scene.objects) {
+        let head = format!("{}: object {:?}", entry.at, entry.name);
+        let all = object.mesh.triangles.len();
+        let flat = (0..all as u32).filter(|&t| object.mesh.area(t) <= 0.0).count();
+        match &scene.materials[object.material].surface {
+            Surface::Emissive { .. } if flat == all => {
+                said.push(format!("{head}: all {all} triangles have no area: it sends out no light"));
+            }
+            surface => {
+                if flat > 0 {
+                    said.push(format!("{head}: {flat} of {all} triangles have no area; rays and samples pass them by"));
+                }
+                if let Surface::Translucent(t) = surface
+                    && let Some((lo, hi)) = object.mesh.bounds()
+                {
+                    said.extend(thin(t, (hi - lo).as_dvec3().length()).map(|what| format!("{head}: {what}")));
+                }
+            }
+        }
+    }
+}
+
+/// A mean free path longer than the object.
+fn thin(t: &Translucent, diagonal: f64) -> Option<String> {
+    let sigma = t.medium.sigma_t_prime();
+    let (c, smallest) = (0..3).map(|c| (c, f64::from(sigma[c]))).min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (smallest > 0.0 && smallest * diagonal < 1.0).then(|| {
+        format!(
+            "the transport mean free path in {}, {:.4} units, is longer than the object's diagonal, {diagonal:.4} units: \
+             it will look almost empty; check `unit` and the coefficients",
+            CHANNELS[c],
+            1.0 / smallest
+        )
+    })
+}
+
+fn light(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
+    let shines = |o: &super::Object| match &scene.materials[o.material].surface {
+        Surface::Emissive { radiance, .. } => !radiance.is_black(),
+        _ => false,
+    };
+    let dark = scene.environment.is_black() && !scene.objects.iter().any(shines);
+    if dark && file.method.name != Some(MethodName::AmbientOcclusion) {
+        said.push(format!(
+            "{}: no light: no emissive object and no [environment]; all but ambient occlusion will be black",
+            file.path.display()
+        ));
+    }
+}
