@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)] // a fixture that cannot be made is a failed test
 
 use marmor::ErrorKind;
+use marmor::film::metrics::{compare, from_halves};
 use marmor::film::{
     Attribute, BadSample, Film, Format, Image, Metadata, PngOptions, Window, check_writable, read_attributes, save,
     write_atomically,
@@ -259,4 +260,170 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
     write_atomically(&link, |file| file.write_all(b"new")).unwrap();
     assert!(fs::symlink_metadata(&link).unwrap().file_type().is_symlink());
     assert_eq!(fs::read(&real).unwrap(), b"new");
+}
+
+// --- reading what others wrote ----------------------------------------------------------------------------
+
+#[test]
+fn an_exr_of_other_layouts_is_read() {
+    use exr::prelude::*;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    // Two parts; the second has tiles of half floats, an overscan of one pixel at the left and bottom, and alpha.
+    let flat = |n: usize, v: f32| FlatSamples::F32(vec![v; n]);
+    let depth = AnyChannels::sort([AnyChannel::new("Z", flat(12, 1.0))].into_iter().collect());
+    let plane = |k: f32| FlatSamples::F16((0..20).map(|i| f16::from_f32(i as f32 * k)).collect());
+    let colour = [("R", 1.0), ("G", 0.5), ("B", 0.25), ("A", 0.0)].map(|(n, k)| AnyChannel::new(n, plane(k)));
+    let encoding = |blocks| Encoding { compression: Compression::PIZ, blocks, line_order: LineOrder::Increasing };
+    let first = Layer::new((4, 3), LayerAttributes::named("depth"), encoding(Blocks::ScanLines), depth);
+    let named = LayerAttributes { layer_position: Vec2(9, 20), ..LayerAttributes::named("beauty") };
+    let tiles = encoding(Blocks::Tiles(Vec2(2, 2)));
+    let second = Layer::new((5, 4), named, tiles, AnyChannels::sort(colour.into_iter().collect()));
+    let attributes = ImageAttributes::new(IntegerBounds::new((10, 20), (4, 3)));
+    Image::from_layers(attributes, vec![first, second]).write().to_file(&path).unwrap();
+
+    let read = marmor::film::Image::read_exr(&path).unwrap();
+    assert_eq!((read.resolution, read.window), ([4, 3], Window::full([4, 3])));
+    assert_eq!(read.get(0, 0), Some(Rgb([1.0, 0.5, 0.25]))); // second column of the data
+    assert_eq!(read.get(3, 2), Some(Rgb([14.0, 7.0, 3.5])));
+    assert_eq!(marmor::film::Image::read_exr_layer(&path, Some("beauty")).unwrap(), read);
+    let missing = marmor::film::Image::read_exr_layer(&path, Some("depth")).unwrap_err().to_string();
+    assert!(missing.contains("depth.R") && missing.contains('Z'), "{missing}");
+}
+
+#[test]
+fn a_file_that_is_no_whole_exr_is_a_file_error_that_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    let error = || {
+        let error = Image::read_exr(&path).unwrap_err();
+        assert_eq!(error.kind(), ErrorKind::File);
+        let message = error.to_string();
+        assert!(message.starts_with(&path.display().to_string()) && !message.contains('\n'), "{message}");
+        message
+    };
+    error(); // not there
+    for (bytes, said) in [(&b""[..], "empty"), (b"text", "not an EXR"), (b"\x89PNG\r\n", "PNG")] {
+        fs::write(&path, bytes).unwrap();
+        let message = error();
+        assert!(message.contains(said), "{message}");
+    }
+    save(&picture([40, 40], 6), &path, &Metadata::default(), PngOptions::default()).unwrap();
+    let whole = fs::read(&path).unwrap();
+    for length in (4..whole.len()).step_by(whole.len() / 97) {
+        fs::write(&path, &whole[..length]).unwrap();
+        error();
+    }
+    fs::remove_file(&path).unwrap();
+    fs::create_dir(&path).unwrap();
+    assert!(error().contains("folder"));
+}
+
+#[test]
+fn a_damaged_header_is_an_error_or_a_picture_but_no_crash() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.exr");
+    save(&picture([8, 8], 7), &path, &Metadata::default(), PngOptions::default()).unwrap();
+    let whole = fs::read(&path).unwrap();
+    for at in 4..whole.len().min(700) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x40 | (at % 7) as u8;
+        fs::write(&path, damaged).unwrap();
+        let _ = Image::read_exr(&path);
+    }
+}
+
+// --- metrics ----------------------------------------------------------------------------------------------
+
+#[test]
+fn the_figures_of_a_small_pair_are_those_worked_out_by_hand() {
+    let reference = Image::from_fn([2, 1], |x, _| Rgb::splat(1.0 + 2.0 * x as f32)); // 1, 3: mean 2
+    let image = Image::from_fn([2, 1], |x, _| Rgb([1.5 + 2.0 * x as f32, 1.0 + 2.0 * x as f32, 1.0 + x as f32]));
+    let c = compare(&image, &reference, Some(&[true, false])).unwrap();
+    // Squares: R 1/4 twice, G 0, B 0 and 1: mean 1.5 / 6.
+    assert!((c.whole.rmse.value - 0.5).abs() < 1e-12);
+    let relative = (0.25 / 1.04 + 0.25 / 9.04 + 1.0 / 9.04) / 6.0; // floor 0.01 * 2^2
+    assert!((c.whole.relmse.unwrap().value - relative).abs() < 1e-12);
+    assert_eq!(c.whole.rmse.interval, None); // one block
+    let interior = c.interior.unwrap(); // the first pixel: floor 0.01 * 1^2
+    assert_eq!(interior.pixels, 1);
+    assert!((interior.relmse.unwrap().value - 0.25 / 1.01 / 3.0).abs() < 1e-12);
+    assert_eq!(c.mean_ratio.map(|r| r.unwrap().value), [1.25, 1.0, 0.75]);
+    assert_eq!((c.max_difference, c.max_pixel, c.max_channel), (1.0, [1, 0], 2));
+}
+
+#[test]
+fn pixels_that_are_no_numbers_are_counted_and_left_out() {
+    let reference = picture([20, 20], 8);
+    let mut image = reference.clone();
+    image.pixels[3] = Rgb([f32::NAN, 0.0, 0.0]);
+    let c = compare(&image, &reference, None).unwrap();
+    assert_eq!((c.non_finite, c.non_finite_reference, c.whole.pixels), (1, 0, 399));
+    assert_eq!((c.whole.rmse.value, c.whole.rmse.interval, c.max_difference), (0.0, Some([0.0, 0.0]), 0.0));
+    image.pixels.fill(Rgb::splat(f32::INFINITY));
+    assert_eq!(compare(&image, &reference, None).unwrap_err().kind(), ErrorKind::Numeric);
+    assert_eq!(compare(&picture([20, 19], 8), &reference, None).unwrap_err().kind(), ErrorKind::Usage);
+    assert!(compare(&reference, &Image::from_fn([20, 20], |_, _| Rgb::BLACK), None).unwrap().whole.relmse.is_none());
+}
+
+#[test]
+fn trimming_leaves_out_the_worst_pixel_in_a_thousand() {
+    let reference = Image::from_fn([50, 40], |_, _| Rgb::WHITE);
+    let mut image = Image::from_fn([50, 40], |_, _| Rgb::splat(1.5));
+    image.pixels[77] = Rgb::splat(1e6);
+    image.pixels[1077] = Rgb::splat(-1e6);
+    let whole = compare(&image, &reference, None).unwrap().whole;
+    assert!(whole.rmse.value > 1e4 && (whole.rmse_trimmed.value - 0.5).abs() < 1e-12);
+    assert!((whole.relmse_trimmed.unwrap().value - 0.25 / 1.01).abs() < 1e-12);
+}
+
+/// A picture around 2 whose noise has unit-free standard deviation 0.2 and is shared by squares of 8x8 pixels, as
+/// the smooth noise of a sample cache is.
+fn blotchy(seed: u64) -> Image {
+    Image::from_fn([128, 128], |x, y| {
+        let square = u64::from(y / 8) << 16 | u64::from(x / 8);
+        Rgb::from_fn(|c| {
+            let sum: f64 = (0..12).map(|i| noise(seed, square << 8 | (c as u64) << 4 | i)).sum();
+            (2.0 + 0.2 * (sum - 6.0)) as f32
+        })
+    })
+}
+
+#[test]
+fn intervals_of_blotchy_noise_cover_the_truth_about_19_times_in_20() {
+    let reference = Image::from_fn([128, 128], |_, _| Rgb::splat(2.0));
+    let (trials, mut covered) = (400, [0; 3]);
+    for seed in 0..trials {
+        let c = compare(&blotchy(seed), &reference, None).unwrap();
+        let figures =
+            [(c.whole.rmse, 0.2), (c.whole.relmse.unwrap(), 0.2 * 0.2 / (4.0 + 0.04)), (c.mean_ratio[1].unwrap(), 1.0)];
+        for (covered, (estimate, truth)) in covered.iter_mut().zip(figures) {
+            let [low, high] = estimate.interval.unwrap();
+            *covered += u32::from(low <= truth && truth <= high);
+        }
+    }
+    // Binomial: mean 380, standard deviation 4.4, 6 of them below; with blocks of one pixel, it would be about 150.
+    for covered in covered {
+        assert!(covered >= 353, "{covered} of {trials}");
+        assert!(covered < 400, "so wide that it says nothing");
+    }
+}
+
+#[test]
+fn halves_estimate_the_error_of_their_mean() {
+    // Passes around 2 with standard deviation 0.2; after n of them the mean's error is 0.2 / sqrt(n), odd n too.
+    for passes in [2_u32, 5, 8] {
+        let mut film = Film::new([128, 128], Window::full([128, 128])).unwrap();
+        for pass in 0..passes {
+            film.add(film.window(), &blotchy(1000 + u64::from(pass)).pixels);
+            film.end_pass();
+        }
+        let estimated = from_halves(&film, None).unwrap().rmse;
+        let truth = 0.2 / f64::from(passes).sqrt();
+        // 768 independent values: the standard error of an RMSE is 1 / sqrt(2 * 768) of it.
+        assert!((estimated.value / truth - 1.0).abs() < 6.0 / 1536_f64.sqrt(), "{passes}: {estimated:?}, {truth}");
+        let [low, high] = estimated.interval.unwrap();
+        assert!(low < truth && truth < high, "{passes}: {estimated:?}, {truth}");
+    }
+    assert!(from_halves(&Film::new([2, 2], Window::full([2, 2])).unwrap(), None).is_none());
 }

@@ -7,6 +7,7 @@ mod exr_file;
 mod exr_read;
 mod image;
 mod memory;
+pub mod metrics;
 mod output;
 mod png_file;
 mod sums;

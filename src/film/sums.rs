@@ -155,7 +155,7 @@ impl Film {
         })
     }
 
-    /// Mean radiance of the even and of the odd passes, for errors without a reference
+    /// Mean radiance of the even and of the odd passes, for errors without a reference ([`super::metrics::from_halves`])
     ///; none before two passes.
     pub fn half_images(&self) -> Option<[Image; 2]> {
         (self.passes >= 2)
