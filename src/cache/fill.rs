@@ -2,40 +2,15 @@
 
 use super::{Cache, CachedSample};
 use crate::bssrdf::Entry;
-use crate::error::{Error, Result, did_you_mean};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Arrival, Lights, emitted};
 use crate::math::Rgb;
 use crate::optics::{refract, transmittance};
 use crate::query::{Ray, RayQuery, RayTally};
 use crate::sampling::CacheStream;
-use crate::scene::Scene;
+use crate::scene::{EntrySampling, Scene};
 use rayon::prelude::*;
 use std::f32::consts::PI;
-
-/// How the direction of arriving light is picked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EntrySampling {
-    /// Area lights by their own points, the environment by the cosine; half of the samples each if there are both.
-    Light,
-    /// Everything by the cosine: the lecture's way. L_t = T12 L_i π A.
-    Cosine,
-}
-
-impl std::str::FromStr for EntrySampling {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        match name {
-            "light" => Ok(Self::Light),
-            "cosine" => Ok(Self::Cosine),
-            _ => {
-                let hint = did_you_mean(name, ["light", "cosine"]);
-                Err(Error::usage(format!("no entry sampling `{name}`{hint}; there are `light` and `cosine`")))
-            }
-        }
-    }
-}
 
 /// What the filling of one object's cache needs, pass after pass.
 pub struct Filler<'a> {

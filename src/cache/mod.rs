@@ -5,9 +5,8 @@ mod fill;
 mod notes;
 
 use crate::bssrdf::Entry;
-use crate::error::{Error, Result, did_you_mean};
 use crate::math::Rgb;
-pub use fill::{EntrySampling, Filler};
+pub use fill::Filler;
 pub use notes::notes;
 
 /// The cached samples of one object and one pass. Samples that met no light are not stored, but count.
@@ -50,36 +49,5 @@ impl std::ops::AddAssign for GatherTally {
         self.exits += other.exits;
         self.pairs += other.pairs;
         self.evaluated += other.evaluated;
-    }
-}
-
-/// How the sum over the cache is estimated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Estimator {
-    /// The lecture's loop over all samples with rejection control.
-    Notes,
-}
-
-impl Estimator {
-    /// All estimators.
-    pub const ALL: [Self; 1] = [Self::Notes];
-
-    /// The name in scene files and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Notes => "notes",
-        }
-    }
-}
-
-impl std::str::FromStr for Estimator {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|e| e.name() == name).ok_or_else(|| {
-            let hint = did_you_mean(name, Self::ALL.map(Self::name));
-            let known = Self::ALL.map(|e| format!("`{}`", e.name())).join(", ");
-            Error::usage(format!("no estimator `{name}`{hint}; there are {known}"))
-        })
     }
 }

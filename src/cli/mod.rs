@@ -5,8 +5,11 @@ mod check;
 mod diff;
 mod eval;
 mod materials;
+mod observers;
 mod profile;
 mod render;
+mod setup;
+mod stats;
 
 use clap::{Parser, Subcommand};
 use marmor::{ErrorKind, Result};

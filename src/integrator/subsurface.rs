@@ -4,14 +4,14 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
-use crate::cache::{Cache, EntrySampling, Estimator, Filler, GatherTally, notes};
+use crate::cache::{Cache, Filler, GatherTally, notes};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{CacheStream, PixelStream, Points};
-use crate::scene::{Scene, Surface};
+use crate::scene::{EntrySampling, Estimator, Scene, Surface};
 
 /// Options of [`Subsurface`].
 #[derive(Clone, Copy, Debug)]

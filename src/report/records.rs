@@ -45,10 +45,10 @@ pub struct Record {
 pub struct ErrorFigures {
     /// Root of the mean squared difference.
     pub rmse: f64,
-    /// Mean squared difference relative to the reference.
-    pub relmse: f64,
-    /// 95 % interval of `relmse`.
-    pub interval: [f64; 2],
+    /// Mean squared difference relative to the reference; `null` if the reference is black.
+    pub relmse: Option<f64>,
+    /// 95 % interval of `relmse`; `null` where the picture is too small to tell.
+    pub interval: Option<[f64; 2]>,
 }
 
 impl Record {

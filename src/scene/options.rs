@@ -60,12 +60,10 @@ named! {
 named! {
     /// How the light arriving at a cached sample is found.
     EntrySampling, "way to sample light at the entry",
-    /// A point on a light.
+    /// Area lights by their own points, the environment by the cosine; half of the samples each if there are both.
     Light = "light",
-    /// A direction by the cosine.
-    Cosine = "cosine",
-    /// Both, weighted by multiple importance sampling.
-    Mixed = "mixed"
+    /// Everything by the cosine: the lecture's way.
+    Cosine = "cosine"
 }
 
 /// `[method]`: what is computed. Everything may be absent; the integrator knows the defaults.

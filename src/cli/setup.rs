@@ -1,0 +1,151 @@
+//! From a scene file and the options over it to a checked scene and a method: shared by `render` and `check`.
+
+use marmor::bssrdf::ModelName;
+use marmor::integrator::{AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions};
+use marmor::query::Backend;
+use marmor::sampling::Points;
+use marmor::scene::{EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Surface};
+use marmor::{Error, Result};
+use std::path::Path;
+
+/// Options that decide what is computed.
+#[derive(clap::Args)]
+pub struct MethodArgs {
+    /// ambient_occlusion, direct or subsurface [default: the scene's, else subsurface if anything is translucent]
+    #[arg(long, value_name = "NAME")]
+    method: Option<MethodName>,
+    /// BSSRDF model of all translucent materials [default: each material's own]
+    #[arg(long, value_name = "NAME")]
+    model: Option<ModelName>,
+    /// How the sum over the sample cache is estimated
+    #[arg(long, value_name = "NAME")]
+    estimator: Option<Estimator>,
+    /// Ray backend: embree or bvh [default: embree if built in]
+    #[arg(long, value_name = "NAME")]
+    backend: Option<Backend>,
+    /// The lecture to the letter: standard dipole, independent samples, cosine-sampled directions, plain loop with
+    /// rejection control, no exit normalisation
+    #[arg(long, conflicts_with_all = ["model", "estimator"])]
+    as_notes: bool,
+    /// Seed of all random numbers [default: the scene's, else 0]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Override a value of the scene file, such as camera.fov=30 or material.wax.eta=1.4; may be given more than once
+    #[arg(short = 'D', value_name = "KEY=VALUE")]
+    define: Vec<String>,
+}
+
+/// A method with its tables.
+pub enum Method {
+    AmbientOcclusion(AmbientOcclusion),
+    Direct(Direct),
+    Subsurface(Box<Subsurface>),
+}
+
+impl Method {
+    /// The name on the command line.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::AmbientOcclusion(_) => MethodName::AmbientOcclusion.name(),
+            Self::Direct(_) => MethodName::Direct.name(),
+            Self::Subsurface(_) => MethodName::Subsurface.name(),
+        }
+    }
+
+    /// What was built and what was left out.
+    pub fn parts(&self, scene: &Scene) -> Vec<Part> {
+        use marmor::integrator::Integrator as _;
+        match self {
+            Self::AmbientOcclusion(m) => m.parts(scene),
+            Self::Direct(m) => m.parts(scene),
+            Self::Subsurface(m) => m.parts(scene),
+        }
+    }
+}
+
+/// Everything before rays.
+pub struct Prepared {
+    pub file: SceneFile,
+    pub scene: Scene,
+    pub method: Method,
+    pub backend: Backend,
+    pub seed: u64,
+    as_notes: bool,
+    estimator: Estimator,
+}
+
+impl Prepared {
+    /// What the EXR header says of the method.
+    pub fn method_attributes(&self) -> Vec<(&'static str, String)> {
+        let Method::Subsurface(_) = self.method else { return Vec::new() };
+        let models: Vec<String> = self
+            .scene
+            .materials
+            .iter()
+            .filter_map(|m| match &m.surface {
+                Surface::Translucent(t) => Some(format!("{}: {}", m.name, t.model.name())),
+                _ => None,
+            })
+            .collect();
+        vec![
+            ("model", models.join(", ")),
+            ("estimator", self.estimator.name().into()),
+            ("asNotes", self.as_notes.to_string()),
+        ]
+    }
+}
+
+/// Reads and checks a scene, and builds the tables of its method.
+pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
+    let file = SceneFile::read(path)?.with(&args.define)?;
+    let mut scene = Scene::load(&file)?;
+    let options = &file.method;
+    for material in &mut scene.materials {
+        if let Surface::Translucent(t) = &mut material.surface {
+            t.model = args.model.or(options.model).unwrap_or(t.model);
+            if args.as_notes {
+                t.model = ModelName::Standard;
+                t.exit_normalisation = false;
+            }
+        }
+    }
+    let seed = args.seed.or(file.render.seed).unwrap_or(0);
+    let estimator = args.estimator.or(options.estimator).unwrap_or(Estimator::Notes);
+    let method = build(&scene, options, args, estimator, seed)?;
+    let backend = args.backend.unwrap_or(Backend::preferred());
+    Ok(Prepared { method, backend, seed, as_notes: args.as_notes, estimator, scene, file })
+}
+
+fn build(scene: &Scene, options: &MethodOptions, args: &MethodArgs, estimator: Estimator, seed: u64) -> Result<Method> {
+    let translucent = scene.materials.iter().any(|m| matches!(m.surface, Surface::Translucent(_)));
+    let default = if translucent { MethodName::Subsurface } else { MethodName::Direct };
+    let name = args.method.or(options.name).unwrap_or(default);
+    if args.as_notes && name != MethodName::Subsurface {
+        return Err(Error::usage(format!("--as-notes is about the method `subsurface`, not `{}`", name.name())));
+    }
+    let light_samples = options.light_samples.unwrap_or(1);
+    Ok(match name {
+        MethodName::AmbientOcclusion => Method::AmbientOcclusion(AmbientOcclusion {
+            radius: options.radius.map_or(f32::INFINITY, |r| r as f32),
+            rays: options.rays.unwrap_or(4),
+        }),
+        MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)),
+        MethodName::Subsurface => {
+            let (entry, points) = if args.as_notes {
+                (EntrySampling::Cosine, Points::Independent)
+            } else {
+                (options.entry.unwrap_or(EntrySampling::Light), Points::Sobol)
+            };
+            let options = SubsurfaceOptions {
+                cache_samples: options.cache_samples.unwrap_or(1024),
+                estimator,
+                entry,
+                points,
+                specular: options.specular.unwrap_or(true),
+                light_samples,
+                seed,
+            };
+            Method::Subsurface(Box::new(Subsurface::new(scene, options)))
+        }
+    })
+}

@@ -1,0 +1,52 @@
+//! `--stats`: what was built, what it cost, how fast it went.
+
+use marmor::film::{Film, write_atomically};
+use marmor::integrator::Part;
+use marmor::render::Outcome;
+use marmor::scene::Scene;
+use marmor::{Error, Result};
+use serde_json::json;
+use std::path::Path;
+
+/// Writes the statistics of a finished render.
+pub fn write(
+    path: &Path,
+    scene: &Scene,
+    backend: &str,
+    seconds_setup: f64,
+    parts: &[Part],
+    outcome: &Outcome,
+    film: &Film,
+) -> Result<()> {
+    let (seconds, tally) = (outcome.seconds, outcome.tally);
+    let per_second = |count: u64, seconds: f64| if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
+    let exits = tally.gather.exits.max(1) as f64;
+    let stats = json!({
+        "version": env!("CARGO_PKG_VERSION"),
+        "scene": scene.name,
+        "backend": backend,
+        "threads": rayon::current_num_threads(),
+        "objects": scene.objects.iter().map(|o| json!({
+            "name": o.name,
+            "triangles": o.mesh.triangles.len(),
+            "material": scene.materials[o.material].name,
+        })).collect::<Vec<_>>(),
+        "parts": parts,
+        "passes": film.passes(),
+        "seconds": { "setup": seconds_setup, "cache": seconds.cache, "gather": seconds.gather },
+        "rays": tally.rays,
+        "gather": tally.gather,
+        "per_exit": {
+            "pairs": tally.gather.pairs as f64 / exits,
+            "evaluated": tally.gather.evaluated as f64 / exits,
+        },
+        "per_second": {
+            "rays": per_second(tally.rays.total(), seconds.total()),
+            "cache_samples": per_second(tally.gather.samples, seconds.cache),
+            "pairs": per_second(tally.gather.pairs, seconds.gather),
+        },
+        "counts": film.counts(),
+    });
+    let text = format!("{stats:#}\n");
+    write_atomically(path, |out| out.write_all(text.as_bytes())).map_err(|e: Error| e.within("statistics"))
+}
