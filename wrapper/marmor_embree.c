@@ -1,0 +1,278 @@
+/* Embree 3 and 4 behind marmor_embree.h. All that differs between versions is in this file. */
+#include "marmor_embree.h"
+
+#if MARMOR_EMBREE_MAJOR == 4
+#include <embree4/rtcore.h>
+#elif MARMOR_EMBREE_MAJOR == 3
+#include <embree3/rtcore.h>
+#else
+#error "the build script sets MARMOR_EMBREE_MAJOR to 3 or 4"
+#endif
+
+#include <math.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#if RTC_VERSION_MAJOR != MARMOR_EMBREE_MAJOR
+#error "embree3/ or embree4/ holds headers of another version"
+#endif
+
+/* The Rust side asserts the same sizes. */
+_Static_assert(sizeof(MarmorRay) == 32, "MarmorRay is eight floats");
+_Static_assert(sizeof(MarmorHit) == 20, "MarmorHit is three floats and two numbers");
+_Static_assert(sizeof(unsigned) == 4 && sizeof(float) == 4, "indices and coordinates are 32 bits");
+_Static_assert(sizeof(struct RTCRayHit) == sizeof(struct RTCRay) + sizeof(struct RTCHit), "a ray, then a hit");
+
+struct MarmorScene {
+    RTCDevice device;
+    RTCScene scene;
+    _Atomic long long bytes;
+    atomic_flag has_error; /* Embree reports from its own threads too */
+    char error[512];       /* text of the first device error since the last `status`, empty if none */
+};
+
+/* Embree writes a whole RTCRayHit of its own header, whose size grew between versions; the guard lies behind it. */
+#define GUARD 0xA5
+typedef struct {
+    struct RTCRayHit rayhit;
+    unsigned char guard[64];
+} GuardedRayHit;
+
+static const char *code_name(enum RTCError code) {
+    switch (code) {
+    case RTC_ERROR_NONE: return "no error";
+    case RTC_ERROR_INVALID_ARGUMENT: return "invalid argument";
+    case RTC_ERROR_INVALID_OPERATION: return "invalid operation";
+    case RTC_ERROR_OUT_OF_MEMORY: return "out of memory";
+    case RTC_ERROR_UNSUPPORTED_CPU: return "unsupported CPU";
+    case RTC_ERROR_CANCELLED: return "cancelled";
+    default: return "unknown error";
+    }
+}
+
+static void on_error(void *user, enum RTCError code, const char *text) {
+    MarmorScene *scene = user;
+    if (!atomic_flag_test_and_set(&scene->has_error)) /* the first error is the cause of those that follow */
+        snprintf(scene->error, sizeof scene->error, "%s (%s)", text && *text ? text : "no text", code_name(code));
+}
+
+static bool on_memory(void *user, ssize_t bytes, bool post) {
+    (void)post;
+    atomic_fetch_add(&((MarmorScene *)user)->bytes, (long long)bytes);
+    return true;
+}
+
+static int fail(char *message, unsigned message_bytes, const char *text) {
+    if (message && message_bytes) snprintf(message, message_bytes, "%s", text);
+    return MARMOR_FAILED;
+}
+
+/* MARMOR_FAILED with Embree's text if a device error came up since the last call. */
+static int status(MarmorScene *scene, char *message, unsigned message_bytes) {
+    enum RTCError code = rtcGetDeviceError(scene->device);
+    if (code == RTC_ERROR_NONE && scene->error[0] == '\0') return MARMOR_OK;
+    fail(message, message_bytes, scene->error[0] ? scene->error : code_name(code));
+    scene->error[0] = '\0';
+    atomic_flag_clear(&scene->has_error);
+    return MARMOR_FAILED;
+}
+
+static void set_ray(struct RTCRay *to, const MarmorRay *ray, float t_min) {
+    to->org_x = ray->origin[0];
+    to->org_y = ray->origin[1];
+    to->org_z = ray->origin[2];
+    to->tnear = t_min;
+    to->dir_x = ray->direction[0];
+    to->dir_y = ray->direction[1];
+    to->dir_z = ray->direction[2];
+    to->time = 0.0f;
+    /* Embree's interval is closed above; ours is open. */
+    to->tfar = isinf(ray->t_max) ? ray->t_max : nextafterf(ray->t_max, -INFINITY);
+    to->mask = 0xffffffffu;
+    to->id = 0;
+    to->flags = 0;
+}
+
+static void intersect(RTCScene scene, struct RTCRayHit *rayhit) {
+    rayhit->hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    rayhit->hit.primID = RTC_INVALID_GEOMETRY_ID;
+#if MARMOR_EMBREE_MAJOR == 4
+    rtcIntersect1(scene, rayhit, NULL);
+#else
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(scene, &context, rayhit);
+#endif
+}
+
+int marmor_scene_closest(const MarmorScene *scene, const MarmorRay *ray, MarmorHit *hit) {
+    struct RTCRayHit rayhit;
+    float t_min = ray->t_min;
+    for (;;) {
+        set_ray(&rayhit.ray, ray, t_min);
+        if (!(rayhit.ray.tnear <= rayhit.ray.tfar)) return MARMOR_MISS;
+        intersect(scene->scene, &rayhit);
+        if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return MARMOR_MISS;
+        /* Embree compares before its last division, which can round onto an end of the open interval. */
+        if (rayhit.ray.tfar >= ray->t_max) return MARMOR_MISS;
+        if (rayhit.ray.tfar > ray->t_min) break;
+        t_min = nextafterf(t_min, INFINITY);
+    }
+    hit->t = rayhit.ray.tfar;
+    hit->u = rayhit.hit.u;
+    hit->v = rayhit.hit.v;
+    hit->mesh = rayhit.hit.geomID;
+    hit->triangle = rayhit.hit.primID;
+    return MARMOR_HIT;
+}
+
+int marmor_scene_occluded(const MarmorScene *scene, const MarmorRay *ray) {
+    struct RTCRay query;
+    set_ray(&query, ray, ray->t_min);
+    if (!(query.tnear <= query.tfar)) return MARMOR_MISS;
+#if MARMOR_EMBREE_MAJOR == 4
+    rtcOccluded1(scene->scene, &query, NULL);
+#else
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(scene->scene, &context, &query);
+#endif
+    return query.tfar == -INFINITY ? MARMOR_HIT : MARMOR_MISS; /* how Embree reports occlusion */
+}
+
+static RTCScene new_scene(RTCDevice device) {
+    RTCScene scene = rtcNewScene(device);
+    if (scene) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    return scene;
+}
+
+static void add_triangles(RTCDevice device, RTCScene scene, unsigned mesh, const float *positions, unsigned vertices,
+                          const unsigned *triangles, unsigned triangle_count) {
+    RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (!geometry) return; /* the device holds the error */
+    /* Embree reads 16 bytes at each vertex: a fourth float keeps the last read inside the buffer. */
+    float *to = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 4 * sizeof(float),
+                                        vertices);
+    unsigned *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                3 * sizeof(unsigned), triangle_count);
+    if (to && indices) {
+        for (size_t i = 0; i < vertices; i++) {
+            memcpy(to + 4 * i, positions + 3 * i, 3 * sizeof(float));
+            to[4 * i + 3] = 0.0f;
+        }
+        memcpy(indices, triangles, (size_t)triangle_count * 3 * sizeof(unsigned));
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometryByID(scene, geometry, mesh);
+    }
+    rtcReleaseGeometry(geometry);
+}
+
+static bool near(float a, float b) { return fabsf(a - b) <= 1e-5f; } /* the values checked are of order 1 */
+
+/* The triangle (1,0,3) (3,0,3) (1,4,3) as geometry 5 and the ray from (1.5,1,-1) along (0,0,2) meet at t = 2 with
+ * u = v = 1/4 and the normal (0,0,8) or its opposite, whose direction Embree has changed; the ray from (3,3,-1) passes by.
+ * Returns what was wrong or NULL. */
+static const char *known_rays(RTCDevice device) {
+    static const float positions[9] = {1, 0, 3, 3, 0, 3, 1, 4, 3};
+    static const unsigned triangle[3] = {0, 1, 2};
+    const char *wrong = NULL;
+    RTCScene rtc_scene = new_scene(device);
+    if (!rtc_scene) return "no scene can be made";
+    add_triangles(device, rtc_scene, 5, positions, 3, triangle, 1);
+    rtcCommitScene(rtc_scene);
+
+    GuardedRayHit q;
+    MarmorRay ray = {{1.5f, 1.0f, -1.0f}, 0.0f, {0.0f, 0.0f, 2.0f}, INFINITY};
+    memset(&q, GUARD, sizeof q);
+    set_ray(&q.rayhit.ray, &ray, ray.t_min);
+    intersect(rtc_scene, &q.rayhit);
+    for (size_t i = 0; i < sizeof q.guard; i++)
+        if (q.guard[i] != GUARD) wrong = "the library writes beyond the header's RTCRayHit";
+    const struct RTCHit *hit = &q.rayhit.hit;
+    if (hit->geomID != 5 || hit->primID != 0)
+        wrong = "a ray with a known hit finds another triangle or none";
+    else if (!near(q.rayhit.ray.tfar, 2.0f))
+        wrong = "a ray with a known hit has another distance";
+    else if (!near(hit->u, 0.25f) || !near(hit->v, 0.25f))
+        wrong = "a ray with a known hit has other barycentric coordinates";
+    else if (!near(hit->Ng_x, 0.0f) || !near(hit->Ng_y, 0.0f) || !near(fabsf(hit->Ng_z), 8.0f))
+        wrong = "a ray with a known hit has another normal";
+
+    MarmorRay beside = {{3.0f, 3.0f, -1.0f}, 0.0f, {0.0f, 0.0f, 2.0f}, INFINITY};
+    MarmorScene scene = {.device = device, .scene = rtc_scene};
+    MarmorHit none;
+    if (!wrong && marmor_scene_occluded(&scene, &ray) != MARMOR_HIT)
+        wrong = "a ray with a known hit is not occluded";
+    if (!wrong && (marmor_scene_closest(&scene, &beside, &none) != MARMOR_MISS ||
+                   marmor_scene_occluded(&scene, &beside) != MARMOR_MISS))
+        wrong = "a ray with a known miss hits";
+    rtcReleaseScene(rtc_scene);
+    return wrong;
+}
+
+int marmor_scene_open(MarmorScene **out, char *message, unsigned message_bytes) {
+    char text[512];
+    *out = NULL;
+    MarmorScene *scene = calloc(1, sizeof *scene);
+    if (!scene) return fail(message, message_bytes, "out of memory");
+    atomic_flag_clear(&scene->has_error);
+    scene->device = rtcNewDevice(NULL);
+    if (!scene->device) {
+        snprintf(text, sizeof text, "no device: %s", code_name(rtcGetDeviceError(NULL)));
+        marmor_scene_close(scene);
+        return fail(message, message_bytes, text);
+    }
+    unsigned version = marmor_scene_version(scene);
+    if (version / 100 != RTC_VERSION / 100) { /* patches keep the ABI, minor versions need not */
+        snprintf(text, sizeof text, "the library is %u.%u.%u but the build used the headers of " RTC_VERSION_STRING
+                 "; rebuild with headers and library of one version", version / 10000, version / 100 % 100, version % 100);
+        marmor_scene_close(scene);
+        return fail(message, message_bytes, text);
+    }
+    rtcSetDeviceErrorFunction(scene->device, on_error, scene);
+    const char *wrong = known_rays(scene->device);
+    if (wrong || status(scene, text, sizeof text) != MARMOR_OK) {
+        char both[1024];
+        snprintf(both, sizeof both, "self-check of %s: %s", RTC_VERSION_STRING, wrong ? wrong : text);
+        marmor_scene_close(scene);
+        return fail(message, message_bytes, both);
+    }
+    rtcSetDeviceMemoryMonitorFunction(scene->device, on_memory, scene);
+    scene->scene = new_scene(scene->device);
+    if (status(scene, message, message_bytes) != MARMOR_OK) {
+        marmor_scene_close(scene);
+        return MARMOR_FAILED;
+    }
+    *out = scene;
+    return MARMOR_OK;
+}
+
+int marmor_scene_add(MarmorScene *scene, unsigned mesh, const float *positions, unsigned vertices,
+                     const unsigned *triangles, unsigned triangle_count, char *message, unsigned message_bytes) {
+    if (triangle_count == 0) return MARMOR_OK;
+    add_triangles(scene->device, scene->scene, mesh, positions, vertices, triangles, triangle_count);
+    return status(scene, message, message_bytes);
+}
+
+int marmor_scene_commit(MarmorScene *scene, char *message, unsigned message_bytes) {
+    rtcCommitScene(scene->scene);
+    return status(scene, message, message_bytes);
+}
+
+unsigned long long marmor_scene_bytes(const MarmorScene *scene) {
+    long long bytes = atomic_load(&scene->bytes);
+    return bytes > 0 ? (unsigned long long)bytes : 0;
+}
+
+unsigned marmor_scene_version(const MarmorScene *scene) {
+    return (unsigned)rtcGetDeviceProperty(scene->device, RTC_DEVICE_PROPERTY_VERSION);
+}
+
+void marmor_scene_close(MarmorScene *scene) {
+    if (!scene) return;
+    if (scene->scene) rtcReleaseScene(scene->scene);
+    if (scene->device) rtcReleaseDevice(scene->device);
+    free(scene);
+}
