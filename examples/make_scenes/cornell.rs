@@ -68,11 +68,12 @@ pub fn knot() -> Mesh {
 pub fn star() -> Mesh {
     const POINTS: usize = 8;
     const Y: f64 = 2.0 * HALF - 1.5;
+    const FORWARD: f64 = 16.0;
     let mut mesh = Mesh::default();
-    let centre = mesh.vertex(DVec3::Y * Y);
+    let centre = mesh.vertex(DVec3::new(0.0, Y, FORWARD));
     for k in 0..2 * POINTS {
         let radius = if k % 2 == 0 { 26.0 } else { 13.0 };
-        mesh.vertex(polar(radius, (k as f64 + 1.0) / (2 * POINTS) as f64 * TAU, Y));
+        mesh.vertex(polar(radius, (k as f64 + 1.0) / (2 * POINTS) as f64 * TAU, Y) + DVec3::Z * FORWARD);
     }
     let n = 2 * POINTS as u32;
     mesh.triangles.extend((0..n).map(|k| [centre, 1 + (k + 1) % n, 1 + k]));
