@@ -402,7 +402,8 @@ fn intervals_of_blotchy_noise_cover_the_truth_about_19_times_in_20() {
             *covered += u32::from(low <= truth && truth <= high);
         }
     }
-    // Binomial: mean 380, standard deviation 4.4, 6 of them below; with blocks of one pixel, it would be about 150.
+    // Binomial: mean 380, standard deviation 4.4, 6 of them below. Intervals that take pixels for
+    // independent cover the truth about 60 times.
     for covered in covered {
         assert!(covered >= 353, "{covered} of {trials}");
         assert!(covered < 400, "so wide that it says nothing");
@@ -426,4 +427,41 @@ fn halves_estimate_the_error_of_their_mean() {
         assert!(low < truth && truth < high, "{passes}: {estimated:?}, {truth}");
     }
     assert!(from_halves(&Film::new([2, 2], Window::full([2, 2])).unwrap(), None).is_none());
+}
+
+#[cfg(feature = "cli")]
+#[test]
+fn diff_prints_a_table_or_json_and_fails_on_files_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let diff = |args: &[&str]| {
+        let binary = std::process::Command::new(env!("CARGO_BIN_EXE_marmor"));
+        let out = { binary }.arg("diff").args(args).current_dir(folder.path()).output().unwrap();
+        let text = |bytes| String::from_utf8(bytes).unwrap();
+        (out.status.code().unwrap(), text(out.stdout), text(out.stderr))
+    };
+    let reference = picture([40, 40], 9);
+    let mut image = reference.clone();
+    image.pixels.iter_mut().for_each(|p| *p *= 1.5);
+    image.pixels[41] = Rgb([f32::NAN, 0.0, 0.0]);
+    for (name, image) in [("a.exr", &image), ("b.exr", &reference), ("small.exr", &picture([40, 39], 9))] {
+        save(image, &folder.path().join(name), &Metadata::default(), PngOptions::default()).unwrap();
+    }
+    let (code, table, _) = diff(&["a.exr", "b.exr"]);
+    assert_eq!(code, 0);
+    assert!(table.starts_with("pixels that are NaN or infinite: 1 in the picture, 0 in the reference"), "{table}");
+    assert!(table.contains("reference  b.exr") && table.contains("RMSE"), "{table}");
+    assert!(!diff(&["b.exr", "b.exr"]).1.contains("NaN"));
+    let (code, json, _) = diff(&["a.exr", "b.exr", "--interior", "b.exr", "--json"]);
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((code, &json["reference"]), (0, &serde_json::json!("b.exr")));
+    let figures = &json["comparison"];
+    assert_eq!((&figures["non_finite"], &figures["interior"]["pixels"]), (&1.into(), &1599.into()));
+    for c in 0..3 {
+        assert!((figures["mean_ratio"][c]["value"].as_f64().unwrap() - 1.5).abs() < 0.01);
+    }
+    for (args, expected) in [(["none.exr", "b.exr"], 4), (["a.exr", "small.exr"], 2)] {
+        let (code, out, message) = diff(&args);
+        assert_eq!((code, out.as_str(), message.lines().count()), (expected, "", 1), "{message}");
+        assert!(message.contains(args[0]), "{message}");
+    }
 }
