@@ -64,6 +64,7 @@ fn a_good_file_loads_without_a_word() {
     let scene = load(GOOD).unwrap();
     assert_eq!(scene.warnings, Vec::<String>::new());
     assert_eq!(scene.meshes().len(), 2);
+    assert_eq!(scene.default_method().name(), "subsurface");
     assert_eq!(scene.unit_in_mm, Some(1.0));
     let Surface::Translucent(stone) = scene.surface(0) else { panic!("not translucent") };
     assert_eq!((stone.medium.sigma_s.0, stone.medium.g, stone.medium.eta), ([2.0, 3.0, 4.0], 0.0, 1.5));
@@ -134,15 +135,16 @@ const MALFORMED: &[(&str, &str, u32, &[&str])] = &[
 
 #[test]
 fn malformed_files_are_refused_by_line_key_and_remedy() {
+    let mut wrongly = Vec::new();
     for (typed, wrong, line, fragments) in MALFORMED {
         assert!(GOOD.contains(typed), "{typed}");
         let (message, kind) = failure(parse(&GOOD.replacen(typed, wrong, 1)), wrong);
-        assert_eq!(kind, ErrorKind::Scene, "{message}");
-        assert!(message.starts_with(&format!("x.toml:{line}: ")), "{wrong}: line {line}: {message}");
-        for fragment in *fragments {
-            assert!(message.contains(fragment), "{wrong}: {fragment}: {message}");
+        let at = format!("x.toml:{line}: ");
+        if kind != ErrorKind::Scene || !message.starts_with(&at) || !fragments.iter().all(|f| message.contains(f)) {
+            wrongly.push(format!("{wrong:?}, expected {at}{fragments:?}:\n    {message}"));
         }
     }
+    assert!(wrongly.is_empty(), "{}", wrongly.join("\n"));
 }
 
 #[test]
@@ -252,6 +254,8 @@ fn obj_files_that_are_read() {
     assert_eq!(weighted.positions[0], DVec3::new(1.0, 2.0, 3.0));
     // Neither an accent in a comment nor one in a group's name stops a file.
     assert!(obj(&[b"# caf\xe9\ng \xe9\n", TRIANGLE.as_bytes(), b"f 1 2 3"].concat()).is_ok());
+    assert_eq!(obj(&[b"\xef\xbb\xbf", TRIANGLE.as_bytes(), b"f 1 2 3"].concat()).unwrap().positions[0], DVec3::ZERO);
+    assert!(parse(&format!("\u{feff}{GOOD}")).is_ok());
     // Digits beyond f32 survive to the recentring.
     let far = obj(b"v 1000000.001 0 0\nv 1000000.002 0 0\nv 1000000 1 0\nf 1 2 3").unwrap().recentred(DVec3::X * 1e6);
     assert_eq!(far.positions[0].x, (1_000_000.001 - 1e6) as f32);
@@ -307,10 +311,8 @@ fn obj_files_that_are_refused_by_line() {
     for (text, fragment) in cases {
         let case = String::from_utf8_lossy(text);
         let (message, kind) = failure(obj(text), &case);
-        assert!(
-            kind == ErrorKind::Scene && message.contains(&format!("m.obj{fragment}")) || message.contains(fragment),
-            "{case}: {message}"
-        );
+        let expected = if fragment.starts_with(':') { format!("m.obj{fragment}") } else { fragment.to_string() };
+        assert!(message.contains(&expected), "{case}: {message}");
         assert_eq!(kind, ErrorKind::Scene, "{case}");
     }
     let (message, _) = failure(obj(&vec![b'v'; (1 << 20) + 2]), "a line of 1 MiB");
@@ -343,7 +345,7 @@ fn damaged_files_never_panic_and_what_is_accepted_is_sound() {
     let text =
         format!("{TRIANGLE}vn 0 0 1\nvn 0 1 0\nvt 0 0\ng a\nf 1//1 2//2 -1//-1\nf 1/1 2/1 3/1 4/1\nf -1 -2 -3\n");
     let mut accepted = 0;
-    for seed in 0..4000 {
+    for seed in 0..2000 {
         if let Ok(mesh) = obj(&damaged(text.as_bytes(), seed)) {
             accepted += 1;
             let n = mesh.positions.len() as u32;
@@ -357,9 +359,9 @@ fn damaged_files_never_panic_and_what_is_accepted_is_sound() {
             mesh.with_smooth_normals().recentred(DVec3::ZERO);
         }
     }
-    assert!((400..3600).contains(&accepted), "{accepted} of 4000: the damage is too great or too small");
+    assert!((200..1800).contains(&accepted), "{accepted} of 2000: the damage is too great or too small");
     let small = GOOD.replacen("radius = 1", "radius = 1\nrings = 3\nsegments = 4", 1);
-    for seed in 0..4000 {
+    for seed in 0..2000 {
         if let Ok(file) = parse(&String::from_utf8_lossy(&damaged(small.as_bytes(), seed)))
             && file.objects.iter().all(|o| !format!("{:?}", o.geometry).contains("Mesh"))
         {
