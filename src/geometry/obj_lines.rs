@@ -6,6 +6,9 @@ use std::io::{self, BufRead, Read};
 /// Longer than any real line; keeps a binary file from being read as one.
 const MAX_LINE: usize = 1 << 20;
 
+/// This many vertices, normals or triangles are refused, so that indices stay below 2^32.
+const MAX_COUNT: usize = 1 << 31;
+
 /// Hands on `v`, `vn` and `f` lines alone; indices come out absolute, checked, without texture coordinates.
 pub(super) struct ObjLines<R> {
     source: R,
@@ -126,6 +129,8 @@ impl<R: BufRead> ObjLines<R> {
         self.out.clear();
         while self.out.is_empty() && self.read_line(&mut raw)? {
             let words = raw.trim_ascii();
+            // Some programs begin with a byte order mark.
+            let words = words.strip_prefix(b"\xef\xbb\xbf").filter(|_| self.line == 1).unwrap_or(words);
             let keyword = words.split(u8::is_ascii_whitespace).next().unwrap_or_default();
             match keyword {
                 b"l" | b"p" => self.ignored += 1,
@@ -133,7 +138,10 @@ impl<R: BufRead> ObjLines<R> {
                     // Anything but UTF-8 is no number; the replacement character makes tobj say so.
                     let text = String::from_utf8_lossy(words).into_owned();
                     let checked = if keyword == b"f" { self.face(&text) } else { self.vector(&text, keyword == b"v") };
-                    if let Err(what) = checked {
+                    let count = self.vertices.max(self.normals).max(self.has_normals.len());
+                    let fits =
+                        || if count < MAX_COUNT { Ok(()) } else { Err("2^31 entries; split the mesh".to_string()) };
+                    if let Err(what) = checked.and_then(|()| fits()) {
                         self.complaint = Some((self.line, what));
                         self.out.clear();
                         return Ok(());

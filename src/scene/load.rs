@@ -6,6 +6,7 @@ use std::rc::Rc;
 
 use super::file::{FovAxis, SceneFile, unit_vector};
 use super::objects::{Geometry, NormalsChoice, ObjectEntry};
+use super::options::MethodName;
 use super::{Camera, Material, Object, Scene, Surface, warnings};
 use crate::error::{Error, Result};
 use crate::geometry::{Mesh, ObjMesh, load_obj, rectangle, sphere};
@@ -43,6 +44,19 @@ impl Scene {
         said.extend(warnings::of(file, &scene));
         scene.warnings = said;
         Ok(scene)
+    }
+
+    /// The method where the file asks for none: subsurface with a translucent object, else direct light where there
+    /// is light, else ambient occlusion.
+    pub fn default_method(&self) -> MethodName {
+        let any = |test: fn(&Surface) -> bool| self.objects.iter().any(|o| test(&self.materials[o.material].surface));
+        if any(|s| matches!(s, Surface::Translucent(_))) {
+            MethodName::Subsurface
+        } else if !self.environment.is_black() || any(|s| matches!(s, Surface::Emissive { .. })) {
+            MethodName::Direct
+        } else {
+            MethodName::AmbientOcclusion
+        }
     }
 
     /// All meshes, in the order of [`Scene::objects`]; what a ray backend is built from.

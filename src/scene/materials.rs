@@ -96,6 +96,10 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
 }
 
 fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64) -> Result<(Medium, String)> {
+    let measured = optics::find(name).ok_or_else(|| {
+        let known: Vec<&str> = optics::CATALOGUE.iter().map(|m| m.name).collect();
+        m.error_at("preset", unknown(name, &known))
+    })?;
     for key in ["sigma_s_prime", "sigma_s", "sigma_a", "g", "per"] {
         if m.has(key) {
             return Err(
@@ -103,10 +107,6 @@ fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64) -> Result<(Medium, String
             );
         }
     }
-    let measured = optics::find(name).ok_or_else(|| {
-        let known: Vec<&str> = optics::CATALOGUE.iter().map(|m| m.name).collect();
-        m.error_at("preset", unknown(name, &known))
-    })?;
     Ok((measured.medium(unit_in_mm), format!("{name} [{}]", measured.source)))
 }
 

@@ -178,7 +178,11 @@ fn transform(o: &Fields<'_>) -> Result<Transform> {
     let columns = [transform.linear.x_axis, transform.linear.y_axis, transform.linear.z_axis];
     let shape = DMat3::from_cols_array_2d(&columns.map(|c| (c / c.abs().max_element()).to_array()));
     let inverse = transform.linear.inverse();
-    if !(shape.determinant().abs() > 1e-12) || !inverse.is_finite() || transform.linear.determinant() == 0.0 {
+    if shape.determinant().abs() <= 1e-12
+        || !shape.is_finite()
+        || !inverse.is_finite()
+        || transform.linear.determinant() == 0.0
+    {
         let key = if t.has("matrix") { "matrix" } else { "scale" };
         return Err(
             t.error_at(key, "has no inverse: it flattens the object; expected a map that keeps its volume above 0")

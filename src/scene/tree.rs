@@ -47,8 +47,8 @@ impl Place {
 impl Node {
     /// The tree of a whole file.
     pub(super) fn parse(text: &str, file: &Path) -> Result<Self> {
-        let line =
-            |offset: usize| 1 + text.as_bytes()[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count();
+        let breaks: Vec<usize> = text.match_indices('\n').map(|(at, _)| at).collect();
+        let line = |offset: usize| 1 + breaks.partition_point(|&at| at < offset);
         let table = toml::de::DeTable::parse(text).map_err(|e| {
             let at = e.span().map_or(String::new(), |span| format!(":{}", line(span.start)));
             Error::scene(format!("{}{at}: not TOML: {}", file.display(), e.message()))
