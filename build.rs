@@ -42,16 +42,22 @@ mod embree {
         let include = dir.join("include");
         let shown = dir.display();
         let Some(major) = [4, 3].into_iter().find(|m| include.join(format!("embree{m}/rtcore.h")).is_file()) else {
-            return Err(format!("EMBREE_DIR={shown}: no include/embree4/rtcore.h or include/embree3/rtcore.h{} ({REMEDY})", older(&include)));
+            return Err(format!(
+                "EMBREE_DIR={shown}: no include/embree4/rtcore.h or include/embree3/rtcore.h{} ({REMEDY})",
+                older(&include)
+            ));
         };
         let lib = libraries_below(dir).into_iter().find(|lib| {
             ["so", "dylib", "a", "lib"].iter().any(|end| {
-                lib.join(format!("libembree{major}.{end}")).is_file() || lib.join(format!("embree{major}.{end}")).is_file()
+                lib.join(format!("libembree{major}.{end}")).is_file()
+                    || lib.join(format!("embree{major}.{end}")).is_file()
             })
         });
         match lib {
             Some(lib) => Ok(Place { major, include: Some(include), lib: Some(lib) }),
-            None => Err(format!("EMBREE_DIR={shown}: headers of Embree {major} but no lib/libembree{major}.so ({REMEDY})")),
+            None => {
+                Err(format!("EMBREE_DIR={shown}: headers of Embree {major} but no lib/libembree{major}.so ({REMEDY})"))
+            }
         }
     }
 
@@ -65,14 +71,20 @@ mod embree {
 
     /// The newest version that the C compiler finds by itself.
     fn find_in_system() -> Result<Place, String> {
-        let header = |name: &str| try_c(&format!("#include <{name}/rtcore.h>\nint main(void) {{ return 0; }}\n"), &["-fsyntax-only"]);
+        let header = |name: &str| {
+            try_c(&format!("#include <{name}/rtcore.h>\nint main(void) {{ return 0; }}\n"), &["-fsyntax-only"])
+        };
         for major in [4, 3] {
             if header(&format!("embree{major}"))? {
-                let program = format!("#include <embree{major}/rtcore.h>\nint main(void) {{ rtcReleaseDevice(rtcNewDevice(0)); return 0; }}\n");
+                let program = format!(
+                    "#include <embree{major}/rtcore.h>\nint main(void) {{ rtcReleaseDevice(rtcNewDevice(0)); return 0; }}\n"
+                );
                 if try_c(&program, &[&format!("-lembree{major}")])? {
                     return Ok(Place { major, include: None, lib: None });
                 }
-                return Err(format!("headers of Embree {major} are installed but programs cannot be linked with libembree{major} ({REMEDY})"));
+                return Err(format!(
+                    "headers of Embree {major} are installed but programs cannot be linked with libembree{major} ({REMEDY})"
+                ));
             }
         }
         let found = if header("embree2")? { ": Embree 2 is, which is too old" } else { "" };
@@ -88,7 +100,11 @@ mod embree {
         let out = out_dir();
         let source = out.join("probe.c");
         std::fs::write(&source, program).map_err(|e| format!("{}: cannot write: {e}", source.display()))?;
-        let compiler = cc::Build::new().cargo_metadata(false).cargo_warnings(false).try_get_compiler().map_err(|e| no_compiler(&e))?;
+        let compiler = cc::Build::new()
+            .cargo_metadata(false)
+            .cargo_warnings(false)
+            .try_get_compiler()
+            .map_err(|e| no_compiler(&e))?;
         let mut command: Command = compiler.to_command();
         command.arg(&source).arg("-o").arg(out.join("probe")).args(arguments);
         command.stdout(Stdio::null()).stderr(Stdio::null());
@@ -132,7 +148,10 @@ mod embree {
             build.include(include);
         }
         build.try_compile("marmor_embree").map_err(|e| {
-            format!("wrapper/marmor_embree.c does not compile with Embree {major}: {}", e.to_string().replace('\n', " "))
+            format!(
+                "wrapper/marmor_embree.c does not compile with Embree {major}: {}",
+                e.to_string().replace('\n', " ")
+            )
         })?;
         if let Some(lib) = &place.lib {
             println!("cargo::rustc-link-search=native={}", lib.display());

@@ -78,12 +78,7 @@ impl RayQuery for Embree {
 impl From<&Ray> for ffi::MarmorRay {
     #[inline]
     fn from(ray: &Ray) -> Self {
-        Self {
-            origin: ray.origin.to_array(),
-            t_min: ray.t_min,
-            direction: ray.direction.to_array(),
-            t_max: ray.t_max,
-        }
+        Self { origin: ray.origin.to_array(), t_min: ray.t_min, direction: ray.direction.to_array(), t_max: ray.t_max }
     }
 }
 
@@ -102,7 +97,8 @@ impl Scene {
         let mut scene = std::ptr::null_mut();
         // SAFETY: `scene` and the message buffer are valid for the call.
         checked(|message, bytes| unsafe { ffi::marmor_scene_open(&mut scene, message, bytes) })?;
-        let scene = NonNull::new(scene).ok_or_else(|| Error::usage("backend `embree`: no scene and no reason given"))?;
+        let scene =
+            NonNull::new(scene).ok_or_else(|| Error::usage("backend `embree`: no scene and no reason given"))?;
         Ok(Self(scene))
     }
 
@@ -125,16 +121,7 @@ impl Scene {
         // each of `triangle_count` (sizes asserted above), each below `vertices`, as `Mesh::area` has read every corner;
         // the wrapper copies both and keeps no pointer.
         checked(|message, bytes| unsafe {
-            ffi::marmor_scene_add(
-                self.0.as_ptr(),
-                number,
-                positions,
-                vertices,
-                indices,
-                triangle_count,
-                message,
-                bytes,
-            )
+            ffi::marmor_scene_add(self.0.as_ptr(), number, positions, vertices, indices, triangle_count, message, bytes)
         })
         .map_err(|e| e.within(format!("mesh {number}")))
     }
@@ -196,11 +183,8 @@ mod tests {
 
     #[test]
     fn memory_is_counted() {
-        let mesh = Mesh {
-            positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
-            triangles: vec![[0, 1, 2]; 1000],
-            normals: None,
-        };
+        let mesh =
+            Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]; 1000], normals: None };
         let backend = Embree::new(&[&mesh]).unwrap();
         assert!(backend.bytes().unwrap() > 1000 * 12);
         assert!(backend.description().starts_with("embree "));
