@@ -174,7 +174,7 @@ mod tests {
     fn the_nearest_of_a_pack_wins_and_the_interval_is_open() {
         let at = |z: f32| RIGHT.map(|p| p + Vec3::Z * z);
         let pack = Pack::new(&[at(3.0), at(1.0), at(2.0)]);
-        let ray = TriangleRay::new(&Ray::new(Vec3::new(0.1, 0.1, 0.0), Vec3::Z));
+        let ray = TriangleRay::new(&Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::Z));
         let t = |lo, hi| pack.closest(&ray, lo, hi).map(|h| (h.t, h.lane));
         assert_eq!(t(0.0, f32::INFINITY), Some((1.0, 1)));
         assert_eq!(t(1.0, f32::INFINITY), Some((2.0, 2)));
