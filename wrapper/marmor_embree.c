@@ -79,17 +79,29 @@ static int status(MarmorScene *scene, char *message, unsigned message_bytes) {
     return MARMOR_FAILED;
 }
 
-static void set_ray(struct RTCRay *to, const MarmorRay *ray, float t_min) {
+/* `t` moved by a few units in the last place; ends of intervals are not negative. */
+static float moved(float t, int units) {
+    int bits;
+    memcpy(&bits, &t, sizeof bits);
+    bits = bits + units > 0 ? bits + units : 0;
+    memcpy(&t, &bits, sizeof bits);
+    return t;
+}
+
+/* Embree's interval is closed above and its test of it comes before a division by an approximate reciprocal. Ends moved
+ * inwards by more than that division can lose make it the open one for both kinds of query, in the same way. */
+#define LAST_PLACES 4
+
+static void set_ray(struct RTCRay *to, const MarmorRay *ray) {
     to->org_x = ray->origin[0];
     to->org_y = ray->origin[1];
     to->org_z = ray->origin[2];
-    to->tnear = t_min;
+    to->tnear = ray->t_min > 0.0f ? moved(ray->t_min, LAST_PLACES) : 0.0f;
     to->dir_x = ray->direction[0];
     to->dir_y = ray->direction[1];
     to->dir_z = ray->direction[2];
     to->time = 0.0f;
-    /* Embree's interval is closed above; ours is open. */
-    to->tfar = isinf(ray->t_max) ? ray->t_max : nextafterf(ray->t_max, -INFINITY);
+    to->tfar = isinf(ray->t_max) ? ray->t_max : moved(ray->t_max, -LAST_PLACES);
     to->mask = 0xffffffffu;
     to->id = 0;
     to->flags = 0;
@@ -109,17 +121,10 @@ static void intersect(RTCScene scene, struct RTCRayHit *rayhit) {
 
 int marmor_scene_closest(const MarmorScene *scene, const MarmorRay *ray, MarmorHit *hit) {
     struct RTCRayHit rayhit;
-    float t_min = ray->t_min;
-    for (;;) {
-        set_ray(&rayhit.ray, ray, t_min);
-        if (!(rayhit.ray.tnear <= rayhit.ray.tfar)) return MARMOR_MISS;
-        intersect(scene->scene, &rayhit);
-        if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return MARMOR_MISS;
-        /* Embree compares before its last division, which can round onto an end of the open interval. */
-        if (rayhit.ray.tfar >= ray->t_max) return MARMOR_MISS;
-        if (rayhit.ray.tfar > ray->t_min) break;
-        t_min = nextafterf(t_min, INFINITY);
-    }
+    set_ray(&rayhit.ray, ray);
+    if (!(rayhit.ray.tnear < rayhit.ray.tfar)) return MARMOR_MISS;
+    intersect(scene->scene, &rayhit);
+    if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return MARMOR_MISS;
     hit->t = rayhit.ray.tfar;
     hit->u = rayhit.hit.u;
     hit->v = rayhit.hit.v;
@@ -130,8 +135,8 @@ int marmor_scene_closest(const MarmorScene *scene, const MarmorRay *ray, MarmorH
 
 int marmor_scene_occluded(const MarmorScene *scene, const MarmorRay *ray) {
     struct RTCRay query;
-    set_ray(&query, ray, ray->t_min);
-    if (!(query.tnear <= query.tfar)) return MARMOR_MISS;
+    set_ray(&query, ray);
+    if (!(query.tnear < query.tfar)) return MARMOR_MISS;
 #if MARMOR_EMBREE_MAJOR == 4
     rtcOccluded1(scene->scene, &query, NULL);
 #else
@@ -186,7 +191,7 @@ static const char *known_rays(RTCDevice device) {
     GuardedRayHit q;
     MarmorRay ray = {{1.5f, 1.0f, -1.0f}, 0.0f, {0.0f, 0.0f, 2.0f}, INFINITY};
     memset(&q, GUARD, sizeof q);
-    set_ray(&q.rayhit.ray, &ray, ray.t_min);
+    set_ray(&q.rayhit.ray, &ray);
     intersect(rtc_scene, &q.rayhit);
     for (size_t i = 0; i < sizeof q.guard; i++)
         if (q.guard[i] != GUARD) wrong = "the library writes beyond the header's RTCRayHit";

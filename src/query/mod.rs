@@ -21,7 +21,7 @@ pub struct Ray {
     pub origin: Vec3,
     /// Direction, of any length above 0; t counts in its lengths.
     pub direction: Vec3,
-    /// Open lower end of the interval.
+    /// Open lower end of the interval, at least 0.
     pub t_min: f32,
     /// Open upper end of the interval.
     pub t_max: f32,

@@ -1,0 +1,310 @@
+//! What every ray backend of this build must do, against brute force in f64 and against each other.
+#![allow(clippy::unwrap_used)] // a backend that cannot be built has failed the test
+
+mod reference;
+mod scenes;
+
+use marmor::geometry::Mesh;
+use marmor::math::Vec3;
+use marmor::query::{self, Backend, Ray, RayQuery};
+use reference::{ROUNDINGS, examine, is_open, verdict};
+use scenes::{Draws, bumpy_sphere, mesh_of, placed, rays, soup};
+
+fn backends<'a>(meshes: &[&'a Mesh]) -> Vec<(Backend, Box<dyn RayQuery + 'a>)> {
+    let built: Vec<Backend> = Backend::ALL.into_iter().filter(|b| b.is_built_in()).collect();
+    assert!(!built.is_empty());
+    built.into_iter().map(|b| (b, query::build(b, meshes).unwrap())).collect()
+}
+
+/// What the rays of a check came to.
+#[derive(Default)]
+struct Tally {
+    hits: usize,
+    /// Rays on which rounding leaves a choice.
+    open: usize,
+}
+
+/// Holds every backend to the f64 answer on every ray, and its two questions and its batches to each other.
+fn check(what: &str, meshes: &[&Mesh], rays: &[Ray]) -> Tally {
+    let backends = backends(meshes);
+    let mut tally = Tally::default();
+    for ray in rays {
+        let exams = examine(meshes, ray);
+        tally.open += usize::from(is_open(&exams));
+        for (backend, query) in &backends {
+            let hit = query.closest(ray);
+            if let Err(wrong) = verdict(&exams, ray, hit.as_ref()) {
+                panic!("{what}, {}: {ray:?}\nfound {hit:?}\n{wrong}", backend.name());
+            }
+            assert_eq!(query.occluded(ray), hit.is_some(), "{what}, {}: {ray:?} found {hit:?}", backend.name());
+            tally.hits += usize::from(hit.is_some());
+        }
+    }
+    for (backend, query) in &backends {
+        let (mut hits, mut occluded) = (vec![None; rays.len()], vec![false; rays.len()]);
+        query.closest_batch(rays, &mut hits);
+        query.occluded_batch(rays, &mut occluded);
+        for (i, ray) in rays.iter().enumerate() {
+            assert_eq!((hits[i], occluded[i]), (query.closest(ray), hits[i].is_some()), "{what}, {}", backend.name());
+        }
+    }
+    tally.hits /= backends.len();
+    tally
+}
+
+#[test]
+fn random_triangles_at_every_scale_in_several_meshes() {
+    for exponent in [-6, -3, 0, 3, 6] {
+        let scale = 10_f32.powi(exponent);
+        let mut draws = Draws::new(1);
+        let meshes: Vec<Mesh> = [200, 0, 1, 150].map(|n| placed(&soup(&mut draws, n), scale, Vec3::ZERO)).into();
+        let meshes: Vec<&Mesh> = meshes.iter().collect();
+        let rays = rays(&mut draws, 1500, scale, Vec3::ZERO);
+        let tally = check(&format!("soup at 10^{exponent}"), &meshes, &rays);
+        assert!(tally.hits > 500 && tally.hits < 1450, "{}", tally.hits);
+        assert!(tally.open < 30, "{} of 1500 rays prove nothing", tally.open);
+    }
+}
+
+/// Coordinates a million sizes away are coarse, but what a ray near them finds is as exact as at the origin: the bound of
+/// `reference` knows only the distance between ray and triangle.
+#[test]
+fn triangles_far_from_the_origin_lose_nothing() {
+    for (size, offset) in [(1.0, 1e4), (100.0, 1e6), (1e-2, 1e3)] {
+        let mut draws = Draws::new(2);
+        let offset = Vec3::new(1.0, -0.7, 0.4) * offset;
+        let mesh = placed(&soup(&mut draws, 200), size, offset);
+        let rays = rays(&mut draws, 1500, size, offset);
+        let tally = check(&format!("soup of {size} at {offset}"), &[&mesh], &rays);
+        assert!(tally.hits > 400, "{}", tally.hits);
+        assert!(tally.open < 300, "{} of 1500 rays prove nothing", tally.open);
+    }
+}
+
+#[test]
+fn triangles_without_area_are_never_hit_and_needles_are_no_trouble() {
+    let mut draws = Draws::new(3);
+    let mut triangles = Vec::new();
+    for _ in 0..100 {
+        let [a, b] = [draws.point(), draws.point()];
+        let third = draws.unit();
+        triangles.push([a, a, a]);
+        triangles.push([a, b, b]);
+        triangles.push([a, b, a]);
+        // Collinear up to rounding: some have no area, others next to none.
+        triangles.push([a, b, a + (b - a) * third]);
+        triangles.push([a, a + (b - a) * 0.5, b]);
+        let thickness = 10_f32.powf(-7.0 * draws.unit());
+        triangles.push([a, b, a + (b - a) * third + draws.direction() * thickness]);
+    }
+    let mesh = mesh_of(triangles);
+    let mut rays = rays(&mut draws, 500, 1.0, Vec3::ZERO);
+    // At the middles of the needles.
+    for t in 0..mesh.triangles.len() as u32 {
+        let [a, b, c] = mesh.corners(t);
+        let from = draws.direction() * 3.0;
+        rays.push(Ray::new(from, (a + b + c) / 3.0 - from));
+    }
+    let tally = check("needles", &[&mesh], &rays);
+    assert!(tally.hits > 50, "{}", tally.hits);
+}
+
+/// Corners on a grid of halves and rays along its lines: every comparison is a tie.
+#[test]
+fn rays_along_the_axes_through_a_grid() {
+    let mut draws = Draws::new(4);
+    let mut step = |n: usize| draws.below(n) as f32 * 0.5;
+    let mesh = mesh_of((0..200).map(|_| [0; 3].map(|_| Vec3::new(step(5), step(5), step(5)))));
+    let mut rays = Vec::new();
+    for axis in 0..3 {
+        for sign in [1.0, -1.0] {
+            for i in 0..81 {
+                let mut origin = [0.25 * (i % 9) as f32, 0.25 * (i / 9) as f32, -1.0];
+                if sign < 0.0 {
+                    origin[2] = 3.0;
+                }
+                origin.rotate_right((axis + 1) % 3);
+                let mut direction = [0.0, -0.0, sign];
+                direction.rotate_right((axis + 1) % 3);
+                rays.push(Ray::new(Vec3::from_array(origin), Vec3::from_array(direction)));
+                direction[(axis + 1) % 3] = 0.5; // one zero is left
+                rays.push(Ray::new(Vec3::from_array(origin), Vec3::from_array(direction)));
+            }
+        }
+    }
+    let tally = check("grid", &[&mesh], &rays);
+    assert!(tally.hits > rays.len() / 3, "{} of {}", tally.hits, rays.len());
+}
+
+#[test]
+fn rays_in_the_plane_of_a_triangle() {
+    let flat = mesh_of([[Vec3::ZERO, Vec3::X, Vec3::Y]]);
+    let mut draws = Draws::new(5);
+    let tilted = mesh_of([[draws.point(), draws.point(), draws.point()]]);
+    for mesh in [&flat, &tilted] {
+        let [a, b, c] = mesh.corners(0);
+        let rays: Vec<Ray> = (0..300)
+            .map(|_| {
+                let mut in_plane = || a + (b - a) * (4.0 * draws.unit() - 2.0) + (c - a) * (4.0 * draws.unit() - 2.0);
+                let from = in_plane();
+                Ray::new(from, in_plane() - from)
+            })
+            .collect();
+        check("in the plane", &[mesh], &rays);
+    }
+}
+
+/// From inside, every ray of a closed surface hits, whichever vertex or edge it goes through.
+#[test]
+fn a_closed_mesh_has_no_leaks() {
+    for scale in [1e-6, 1.0, 1e6] {
+        let mesh = placed(&bumpy_sphere(24), scale, Vec3::ZERO);
+        let mut draws = Draws::new(6);
+        for (backend, query) in backends(&[&mesh]) {
+            let mut through = |from: Vec3, to: Vec3, what: &str| {
+                let ray = Ray::new(from, to - from);
+                let hit = query.closest(&ray);
+                assert!(hit.is_some(), "{}: {ray:?} leaks through {what}", backend.name());
+                assert!(query.occluded(&ray), "{}: {ray:?} leaks through {what}", backend.name());
+            };
+            for i in 0..4 {
+                let from = if i == 0 { Vec3::ZERO } else { draws.point() * 0.4 * scale };
+                for &p in &mesh.positions {
+                    through(from, p, "a vertex");
+                }
+                for t in 0..mesh.triangles.len() as u32 {
+                    let [a, b, c] = mesh.corners(t);
+                    for (a, b) in [(a, b), (b, c), (c, a)] {
+                        through(from, a + (b - a) * 0.5, "the middle of an edge");
+                        through(from, a + (b - a) * draws.unit(), "an edge");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_interval_is_open_at_both_ends() {
+    let mut draws = Draws::new(7);
+    let mesh = soup(&mut draws, 300);
+    let built = backends(&[&mesh]);
+    let mut twice = 0;
+    for ray in rays(&mut draws, 1000, 1.0, Vec3::ZERO) {
+        for (backend, query) in &built {
+            let Some(first) = query.closest(&ray) else { continue };
+            let before = Ray { t_max: first.t, ..ray };
+            assert_eq!(query.closest(&before), None, "{}: {ray:?}", backend.name());
+            assert!(!query.occluded(&before), "{}: {ray:?}", backend.name());
+            let beyond = Ray { t_min: first.t, ..ray };
+            let second = query.closest(&beyond);
+            assert!(second.is_none_or(|s| s.t > first.t), "{}: {ray:?} {first:?} {second:?}", backend.name());
+            assert_eq!(query.occluded(&beyond), second.is_some(), "{}: {ray:?}", backend.name());
+            twice += usize::from(second.is_some());
+            // A hair wider and it is inside.
+            let around = Ray { t_min: first.t * 0.999_99, t_max: first.t * 1.000_01, ..ray };
+            assert!(query.closest(&around).is_some_and(|h| h.t == first.t) && query.occluded(&around));
+        }
+    }
+    assert!(twice > 100, "{twice}");
+}
+
+#[test]
+fn an_empty_scene_has_no_hits() {
+    let empty = Mesh::default();
+    let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+    for meshes in [&[][..], &[&empty], &[&empty, &empty]] {
+        for (_, query) in backends(meshes) {
+            assert!(query.closest(&ray).is_none() && !query.occluded(&ray));
+        }
+    }
+}
+
+/// A ray that leaves a surface does not meet it again, at any scale and ten thousand sizes from the origin.
+#[test]
+fn rays_that_leave_a_surface_do_not_hit_it() {
+    let mut draws = Draws::new(8);
+    let unit = soup(&mut draws, 200);
+    for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
+        for offset in [0.0, 1e4] {
+            let mesh = placed(&unit, scale, Vec3::new(-0.6, 1.0, 0.3) * offset * scale);
+            for (backend, query) in backends(&[&mesh]) {
+                for i in 0..4000 {
+                    let triangle = draws.below(mesh.triangles.len()) as u32;
+                    if mesh.area(triangle) == 0.0 {
+                        continue;
+                    }
+                    let u = draws.unit();
+                    let point = mesh.point(triangle, u, draws.unit() * (1.0 - u));
+                    let mut direction = draws.direction();
+                    if i % 4 == 0 {
+                        // Grazing: nearly all of the normal taken out.
+                        direction -= point.n_geometric * (direction.dot(point.n_geometric) * 0.999);
+                    }
+                    let hit = query.closest(&Ray::new(point.leave(direction), direction));
+                    assert!(
+                        hit.is_none_or(|h| h.triangle != triangle),
+                        "{} at {scale}, {offset} away: {hit:?} from {:?} into {direction}",
+                        backend.name(),
+                        mesh.corners(triangle)
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Both backends in one process give one answer, but for rays within rounding of an edge. Such rays are a share of about
+/// perimeter times rounding over area, 7 rounding / edge length for compact triangles, once for each sheet passed.
+#[test]
+#[cfg(all(feature = "bvh", feature = "embree"))]
+fn the_two_backends_agree() {
+    let rings = 60;
+    let mesh = bumpy_sphere(rings);
+    let [bvh, embree] = [Backend::Bvh, Backend::Embree].map(|b| query::build(b, &[&mesh]).unwrap());
+    let mut draws = Draws::new(9);
+    let count = 100_000;
+    let (mut hits, mut others, mut one_sided) = (0, 0, 0);
+    let rounding = 2.0 * ROUNDINGS * f64::from(f32::EPSILON) * 3.5; // both may err; 3.5 is the farthest corner
+    for _ in 0..count {
+        let (from, to) = (draws.direction() * 2.5 * draws.unit(), draws.point() * 0.8);
+        let ray = Ray::new(from, (to - from).normalize());
+        match (bvh.closest(&ray), embree.closest(&ray)) {
+            (Some(a), Some(b)) if a.triangle == b.triangle => {
+                let n = mesh.geometric_normal(a.triangle).dot(ray.direction).abs();
+                assert!(f64::from((a.t - b.t).abs()) * f64::from(n.max(1e-3)) < rounding, "{a:?} {b:?} {ray:?}");
+                hits += 1;
+            }
+            (Some(_), Some(_)) => others += 1,
+            (None, None) => {}
+            _ => one_sided += 1,
+        }
+        assert_eq!(bvh.occluded(&ray), bvh.closest(&ray).is_some());
+    }
+    let edge = std::f64::consts::PI / f64::from(rings);
+    // Cells at the poles are thin: twice the share of compact ones. 6 standard errors of a count on top.
+    let expected = 2.0 * 7.0 * rounding / edge * f64::from(count);
+    let most = expected + 6.0 * expected.sqrt();
+    eprintln!("{hits} same, {others} other triangle, {one_sided} hit and miss; at most {most:.0}");
+    assert!(hits > count / 2);
+    assert!(f64::from(others + one_sided) < most, "{others} and {one_sided} of {count}, at most {most:.0}");
+}
+
+/// Queries from many threads are the queries from one.
+#[test]
+fn threads_do_not_disturb_each_other() {
+    let mesh = bumpy_sphere(30);
+    let mut draws = Draws::new(10);
+    let rays = rays(&mut draws, 4000, 1.0, Vec3::ZERO);
+    for (backend, query) in backends(&[&mesh]) {
+        let alone: Vec<_> = rays.iter().map(|r| query.closest(r)).collect();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    let together: Vec<_> = rays.iter().map(|r| query.closest(r)).collect();
+                    assert!(together == alone, "{}", backend.name());
+                });
+            }
+        });
+    }
+}
