@@ -1,5 +1,6 @@
 //! The file as typed, and the checked world made from it: camera, materials, meshes, units.
-//! Not for: rays, light transport. Read first: `file.rs` (what can be typed), `world.rs` (what the renderer sees),
+//! Not for: rays, light transport. Read first: `file.rs`, `objects.rs`, `materials.rs`, `options.rs` (what can be typed;
+//! `tree.rs` remembers the lines), `world.rs` (what the renderer sees),
 //! `load.rs` (the way from one to the other).
 
 mod camera;
