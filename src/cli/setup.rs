@@ -97,30 +97,40 @@ impl Prepared {
 
 /// Reads and checks a scene, and builds the tables of its method.
 pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
-    let file = SceneFile::read(path)?.with(&args.define)?;
+    let file = SceneFile::read(path)?.with(&args.overrides())?;
     let mut scene = Scene::load(&file)?;
-    let options = &file.method;
-    for material in &mut scene.materials {
-        if let Surface::Translucent(t) = &mut material.surface {
-            t.model = args.model.or(options.model).unwrap_or(t.model);
-            if args.as_notes {
+    if args.as_notes {
+        for material in &mut scene.materials {
+            if let Surface::Translucent(t) = &mut material.surface {
                 t.model = ModelName::Standard;
                 t.exit_normalisation = false;
             }
         }
     }
-    let seed = args.seed.or(file.render.seed).unwrap_or(0);
-    let estimator = args.estimator.or(options.estimator).unwrap_or(Estimator::Notes);
-    let method = build(&scene, options, args, estimator, seed)?;
+    let seed = file.render.seed.unwrap_or(0);
+    let estimator = file.method.estimator.unwrap_or(Estimator::Notes);
+    let method = build(&scene, &file.method, args.as_notes, estimator, seed)?;
     let backend = args.backend.unwrap_or(Backend::preferred());
     Ok(Prepared { method, backend, seed, as_notes: args.as_notes, estimator, scene, file })
 }
 
-fn build(scene: &Scene, options: &MethodOptions, args: &MethodArgs, estimator: Estimator, seed: u64) -> Result<Method> {
-    let translucent = scene.materials.iter().any(|m| matches!(m.surface, Surface::Translucent(_)));
-    let default = if translucent { MethodName::Subsurface } else { MethodName::Direct };
-    let name = args.method.or(options.name).unwrap_or(default);
-    if args.as_notes && name != MethodName::Subsurface {
+impl MethodArgs {
+    /// The options as keys of the scene file, so that messages, warnings and file headers know them; `-D` comes last.
+    fn overrides(&self) -> Vec<String> {
+        let mut keys = Vec::new();
+        let mut put = |key: &str, value: Option<String>| keys.extend(value.map(|v| format!("{key}={v}")));
+        put("method.name", self.method.map(|m| m.name().into()));
+        put("method.model", self.model.map(|m| m.name().into()));
+        put("method.estimator", self.estimator.map(|e| e.name().into()));
+        put("render.seed", self.seed.map(|s| s.to_string()));
+        keys.extend(self.define.iter().cloned());
+        keys
+    }
+}
+
+fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Estimator, seed: u64) -> Result<Method> {
+    let name = options.name.unwrap_or_else(|| scene.default_method());
+    if as_notes && name != MethodName::Subsurface {
         return Err(Error::usage(format!("--as-notes is about the method `subsurface`, not `{}`", name.name())));
     }
     let light_samples = options.light_samples.unwrap_or(1);
@@ -131,7 +141,7 @@ fn build(scene: &Scene, options: &MethodOptions, args: &MethodArgs, estimator: E
         }),
         MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)),
         MethodName::Subsurface => {
-            let (entry, points) = if args.as_notes {
+            let (entry, points) = if as_notes {
                 (EntrySampling::Cosine, Points::Independent)
             } else {
                 (options.entry.unwrap_or(EntrySampling::Light), Points::Sobol)
