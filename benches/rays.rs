@@ -6,7 +6,6 @@
 //! Without a file the mesh is a sphere with bumps of about 70 000 triangles. With both backends the last lines give their
 //! ratio, measured in turns so that a busy machine slows both.
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // a benchmark prints, and stops at what it cannot read
-#![allow(missing_docs)] // criterion's macros make public items
 
 #[path = "../tests/contract_backends/scenes.rs"]
 #[allow(dead_code)] // the tests use the rest

@@ -28,6 +28,7 @@ _Static_assert(sizeof(struct RTCRayHit) == sizeof(struct RTCRay) + sizeof(struct
 struct MarmorScene {
     RTCDevice device;
     RTCScene scene;
+    float scale; /* Embree's coordinates over the caller's; a power of two */
     _Atomic long long bytes;
     atomic_flag has_error; /* Embree reports from its own threads too */
     char error[512];       /* text of the first device error since the last `status`, empty if none */
@@ -92,19 +93,51 @@ static float moved(float t, int units) {
  * inwards by more than that division can lose make it the open one for both kinds of query, in the same way. */
 #define LAST_PLACES 4
 
-static void set_ray(struct RTCRay *to, const MarmorRay *ray) {
-    to->org_x = ray->origin[0];
-    to->org_y = ray->origin[1];
-    to->org_z = ray->origin[2];
-    to->tnear = ray->t_min > 0.0f ? moved(ray->t_min, LAST_PLACES) : 0.0f;
-    to->dir_x = ray->direction[0];
-    to->dir_y = ray->direction[1];
-    to->dir_z = ray->direction[2];
+/* Embree's kernels hold thresholds of their own (weights become zero where areas are below 1e-18), so what they find
+ * depends on the unit. They get the scene with its largest coordinate near 2^16 and directions with their largest component
+ * near 1. All factors are powers of two, which lose nothing: hits are as exact as the kernels, at any scale. */
+#define LARGEST_EXPONENT 16
+
+/* The power of two that brings `largest` to between 2^(to - 1) and 2^to, or as near as a float can. */
+static float power_to(float largest, int to) {
+    int e = 0;
+    frexpf(largest, &e);
+    e = to - e;
+    return ldexpf(1.0f, e < -126 ? -126 : e > 126 ? 126 : e);
+}
+
+static float direction_scale(const MarmorRay *ray) {
+    float x = fabsf(ray->direction[0]), y = fabsf(ray->direction[1]), z = fabsf(ray->direction[2]);
+    float largest = x > y ? x : y;
+    largest = z > largest ? z : largest;
+    int bits; /* the exponent of a normal number, without the call of frexpf for every ray */
+    memcpy(&bits, &largest, sizeof bits);
+    int e = (bits >> 23) - 127;
+    if (e < -126 || e > 126) return power_to(largest, 1);
+    bits = (127 - e) << 23;
+    float scale;
+    memcpy(&scale, &bits, sizeof scale);
+    return scale;
+}
+
+/* Returns what distances of this ray must be multiplied with to become the caller's. */
+static float set_ray(struct RTCRay *to, const MarmorRay *ray, float scale) {
+    float direction = direction_scale(ray);
+    double t_scale = (double)scale / direction; /* may be beyond a float; the products below need not be */
+    to->org_x = ray->origin[0] * scale;
+    to->org_y = ray->origin[1] * scale;
+    to->org_z = ray->origin[2] * scale;
+    float t_min = (float)(ray->t_min * t_scale), t_max = (float)(ray->t_max * t_scale);
+    to->tnear = t_min > 0.0f ? moved(t_min, LAST_PLACES) : 0.0f;
+    to->dir_x = ray->direction[0] * direction;
+    to->dir_y = ray->direction[1] * direction;
+    to->dir_z = ray->direction[2] * direction;
     to->time = 0.0f;
-    to->tfar = isinf(ray->t_max) ? ray->t_max : moved(ray->t_max, -LAST_PLACES);
+    to->tfar = isinf(t_max) ? t_max : moved(t_max, -LAST_PLACES);
     to->mask = 0xffffffffu;
     to->id = 0;
     to->flags = 0;
+    return (float)(1.0 / t_scale);
 }
 
 static void intersect(RTCScene scene, struct RTCRayHit *rayhit) {
@@ -121,11 +154,11 @@ static void intersect(RTCScene scene, struct RTCRayHit *rayhit) {
 
 int marmor_scene_closest(const MarmorScene *scene, const MarmorRay *ray, MarmorHit *hit) {
     struct RTCRayHit rayhit;
-    set_ray(&rayhit.ray, ray);
+    float per_t = set_ray(&rayhit.ray, ray, scene->scale);
     if (!(rayhit.ray.tnear < rayhit.ray.tfar)) return MARMOR_MISS;
     intersect(scene->scene, &rayhit);
     if (rayhit.hit.geomID == RTC_INVALID_GEOMETRY_ID) return MARMOR_MISS;
-    hit->t = rayhit.ray.tfar;
+    hit->t = rayhit.ray.tfar * per_t;
     hit->u = rayhit.hit.u;
     hit->v = rayhit.hit.v;
     hit->mesh = rayhit.hit.geomID;
@@ -135,7 +168,7 @@ int marmor_scene_closest(const MarmorScene *scene, const MarmorRay *ray, MarmorH
 
 int marmor_scene_occluded(const MarmorScene *scene, const MarmorRay *ray) {
     struct RTCRay query;
-    set_ray(&query, ray);
+    set_ray(&query, ray, scene->scale);
     if (!(query.tnear < query.tfar)) return MARMOR_MISS;
 #if MARMOR_EMBREE_MAJOR == 4
     rtcOccluded1(scene->scene, &query, NULL);
@@ -153,8 +186,8 @@ static RTCScene new_scene(RTCDevice device) {
     return scene;
 }
 
-static void add_triangles(RTCDevice device, RTCScene scene, unsigned mesh, const float *positions, unsigned vertices,
-                          const unsigned *triangles, unsigned triangle_count) {
+static void add_triangles(RTCDevice device, RTCScene scene, float scale, unsigned mesh, const float *positions,
+                          unsigned vertices, const unsigned *triangles, unsigned triangle_count) {
     RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
     if (!geometry) return; /* the device holds the error */
     /* Embree reads 16 bytes at each vertex: a fourth float keeps the last read inside the buffer. */
@@ -164,7 +197,7 @@ static void add_triangles(RTCDevice device, RTCScene scene, unsigned mesh, const
                                                 3 * sizeof(unsigned), triangle_count);
     if (to && indices) {
         for (size_t i = 0; i < vertices; i++) {
-            memcpy(to + 4 * i, positions + 3 * i, 3 * sizeof(float));
+            for (size_t k = 0; k < 3; k++) to[4 * i + k] = positions[3 * i + k] * scale;
             to[4 * i + 3] = 0.0f;
         }
         memcpy(indices, triangles, (size_t)triangle_count * 3 * sizeof(unsigned));
@@ -185,20 +218,20 @@ static const char *known_rays(RTCDevice device) {
     const char *wrong = NULL;
     RTCScene rtc_scene = new_scene(device);
     if (!rtc_scene) return "no scene can be made";
-    add_triangles(device, rtc_scene, 5, positions, 3, triangle, 1);
+    add_triangles(device, rtc_scene, 1.0f, 5, positions, 3, triangle, 1);
     rtcCommitScene(rtc_scene);
 
     GuardedRayHit q;
     MarmorRay ray = {{1.5f, 1.0f, -1.0f}, 0.0f, {0.0f, 0.0f, 2.0f}, INFINITY};
     memset(&q, GUARD, sizeof q);
-    set_ray(&q.rayhit.ray, &ray);
+    float per_t = set_ray(&q.rayhit.ray, &ray, 1.0f);
     intersect(rtc_scene, &q.rayhit);
     for (size_t i = 0; i < sizeof q.guard; i++)
         if (q.guard[i] != GUARD) wrong = "the library writes beyond the header's RTCRayHit";
     const struct RTCHit *hit = &q.rayhit.hit;
     if (hit->geomID != 5 || hit->primID != 0)
         wrong = "a ray with a known hit finds another triangle or none";
-    else if (!near(q.rayhit.ray.tfar, 2.0f))
+    else if (!near(q.rayhit.ray.tfar * per_t, 2.0f))
         wrong = "a ray with a known hit has another distance";
     else if (!near(hit->u, 0.25f) || !near(hit->v, 0.25f))
         wrong = "a ray with a known hit has other barycentric coordinates";
@@ -206,7 +239,7 @@ static const char *known_rays(RTCDevice device) {
         wrong = "a ray with a known hit has another normal";
 
     MarmorRay beside = {{3.0f, 3.0f, -1.0f}, 0.0f, {0.0f, 0.0f, 2.0f}, INFINITY};
-    MarmorScene scene = {.device = device, .scene = rtc_scene};
+    MarmorScene scene = {.device = device, .scene = rtc_scene, .scale = 1.0f};
     MarmorHit none;
     if (!wrong && marmor_scene_occluded(&scene, &ray) != MARMOR_HIT)
         wrong = "a ray with a known hit is not occluded";
@@ -217,12 +250,13 @@ static const char *known_rays(RTCDevice device) {
     return wrong;
 }
 
-int marmor_scene_open(MarmorScene **out, char *message, unsigned message_bytes) {
+int marmor_scene_open(MarmorScene **out, float largest, char *message, unsigned message_bytes) {
     char text[512];
     *out = NULL;
     MarmorScene *scene = calloc(1, sizeof *scene);
     if (!scene) return fail(message, message_bytes, "out of memory");
     atomic_flag_clear(&scene->has_error);
+    scene->scale = largest > 0.0f ? power_to(largest, LARGEST_EXPONENT) : 1.0f;
     scene->device = rtcNewDevice(NULL);
     if (!scene->device) {
         snprintf(text, sizeof text, "no device: %s", code_name(rtcGetDeviceError(NULL)));
@@ -240,7 +274,8 @@ int marmor_scene_open(MarmorScene **out, char *message, unsigned message_bytes) 
     const char *wrong = known_rays(scene->device);
     if (wrong || status(scene, text, sizeof text) != MARMOR_OK) {
         char both[1024];
-        snprintf(both, sizeof both, "self-check of %s: %s", RTC_VERSION_STRING, wrong ? wrong : text);
+        snprintf(both, sizeof both, "self-check of Embree %u.%u.%u failed: %s", version / 10000, version / 100 % 100,
+                 version % 100, wrong ? wrong : text);
         marmor_scene_close(scene);
         return fail(message, message_bytes, both);
     }
@@ -257,7 +292,7 @@ int marmor_scene_open(MarmorScene **out, char *message, unsigned message_bytes) 
 int marmor_scene_add(MarmorScene *scene, unsigned mesh, const float *positions, unsigned vertices,
                      const unsigned *triangles, unsigned triangle_count, char *message, unsigned message_bytes) {
     if (triangle_count == 0) return MARMOR_OK;
-    add_triangles(scene->device, scene->scene, mesh, positions, vertices, triangles, triangle_count);
+    add_triangles(scene->device, scene->scene, scene->scale, mesh, positions, vertices, triangles, triangle_count);
     return status(scene, message, message_bytes);
 }
 

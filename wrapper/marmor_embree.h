@@ -32,8 +32,8 @@ typedef struct MarmorHit {
 } MarmorHit;
 
 /* Opens a device and an empty scene, after checks that the library is the one the header belongs to: its version, and
- * rays with known answers. Writes the scene to `scene`. */
-int marmor_scene_open(MarmorScene **scene, char *message, unsigned message_bytes);
+ * rays with known answers. Writes the scene to `scene`. `largest` is the largest size of a coordinate that will be added. */
+int marmor_scene_open(MarmorScene **scene, float largest, char *message, unsigned message_bytes);
 
 /* Copies a mesh: three floats a vertex, three indices a triangle. `mesh` is the number that hits will carry; each number
  * may be used once. A mesh without triangles is none. */

@@ -29,7 +29,8 @@ impl Embree {
     /// # Errors
     /// A usage error with Embree's own text if the library fails its self-check or reports an error.
     pub fn new(meshes: &[&Mesh]) -> Result<Self> {
-        let mut scene = Scene::open()?;
+        let sizes = meshes.iter().flat_map(|m| &m.positions).map(|p| p.abs().max_element());
+        let mut scene = Scene::open(sizes.fold(0.0, f32::max))?;
         for (number, mesh) in meshes.iter().enumerate() {
             scene.add(number as u32, mesh)?;
         }
@@ -92,11 +93,11 @@ unsafe impl Send for Scene {}
 unsafe impl Sync for Scene {}
 
 impl Scene {
-    /// A device that passed its checks, with an empty scene.
-    fn open() -> Result<Self> {
+    /// A device that passed its checks, with an empty scene for coordinates of up to `largest` [unit].
+    fn open(largest: f32) -> Result<Self> {
         let mut scene = std::ptr::null_mut();
         // SAFETY: `scene` and the message buffer are valid for the call.
-        checked(|message, bytes| unsafe { ffi::marmor_scene_open(&mut scene, message, bytes) })?;
+        checked(|message, bytes| unsafe { ffi::marmor_scene_open(&mut scene, largest, message, bytes) })?;
         let scene =
             NonNull::new(scene).ok_or_else(|| Error::usage("backend `embree`: no scene and no reason given"))?;
         Ok(Self(scene))
@@ -157,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_device_error_comes_back_as_embrees_own_text() {
-        let mut scene = Scene::open().unwrap();
+        let mut scene = Scene::open(1.0).unwrap();
         // More vertices than Embree can count bytes for is refused by Embree, not by us.
         let message = checked(|message, bytes| {
             // SAFETY: Embree fails before anything is read: no buffer of this size can be made.
