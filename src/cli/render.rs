@@ -200,6 +200,13 @@ impl Task<'_> {
             let interval = e.interval.map_or(String::new(), |[low, high]| format!(" (95 %: {low:.4e} to {high:.4e})"));
             eprintln!("against the reference: RMSE {:.4e}{relative}{interval}", e.rmse);
         }
+        if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 {
+            eprintln!(
+                "warning: none of {} samples on translucent surfaces met any light: do the lights face them? (a light \
+                 shines along its outward normal; `two_sided = true` lets it shine both ways)",
+                outcome.tally.gather.samples
+            );
+        }
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         eprintln!("wrote {}", names.join(", "));
         let counts = film.counts();
