@@ -7,7 +7,7 @@ mod scenes;
 use marmor::geometry::Mesh;
 use marmor::math::Vec3;
 use marmor::query::{self, Backend, Ray, RayQuery};
-use reference::{ROUNDINGS, examine, is_open, verdict};
+use reference::{examine, is_open, verdict};
 use scenes::{Draws, bumpy_sphere, mesh_of, placed, rays, soup};
 
 fn backends<'a>(meshes: &[&'a Mesh]) -> Vec<(Backend, Box<dyn RayQuery + 'a>)> {
@@ -269,7 +269,7 @@ fn the_two_backends_agree() {
     let mut draws = Draws::new(9);
     let count = 100_000;
     let (mut hits, mut others, mut one_sided) = (0, 0, 0);
-    let rounding = 2.0 * ROUNDINGS * f64::from(f32::EPSILON) * 3.5; // both may err; 3.5 is the farthest corner
+    let rounding = 2.0 * reference::ROUNDINGS * f64::from(f32::EPSILON) * 3.5; // both may err; 3.5 is the farthest corner
     for _ in 0..count {
         let (from, to) = (draws.direction() * 2.5 * draws.unit(), draws.point() * 0.8);
         let ray = Ray::new(from, (to - from).normalize());
