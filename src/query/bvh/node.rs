@@ -78,17 +78,19 @@ pub fn widen(t: f32) -> f32 {
 const HALF_ULP: f32 = 0.5 * f32::EPSILON;
 const TWO_GAMMA_3: f32 = 2.0 * (3.0 * HALF_ULP) / (1.0 - 3.0 * HALF_ULP);
 
-/// The larger; `b` if `a` is not a number: the plane of a slab in which the ray lies bounds nothing. (`Vec4::max` does the
-/// same on some machines only.)
+/// `Vec4::max` and `Vec4::min` give the second of two numbers if one is not a number: true of SSE, not of other machines.
+const SECOND_IF_NAN: bool = cfg!(any(target_arch = "x86_64", target_arch = "x86"));
+
+/// The larger; `b` if `a` is not a number: the plane of a slab in which the ray lies bounds nothing.
 #[inline]
 fn larger(a: Vec4, b: Vec4) -> Vec4 {
-    Vec4::select(a.cmpgt(b), a, b)
+    if SECOND_IF_NAN { a.max(b) } else { Vec4::select(a.cmpgt(b), a, b) }
 }
 
 /// The smaller; `b` if `a` is not a number.
 #[inline]
 fn smaller(a: Vec4, b: Vec4) -> Vec4 {
-    Vec4::select(a.cmplt(b), a, b)
+    if SECOND_IF_NAN { a.min(b) } else { Vec4::select(a.cmplt(b), a, b) }
 }
 
 impl Node {
