@@ -1,5 +1,7 @@
 //! A node with the boxes of four children, and the test of a ray against the four at once.
 
+use glam::Vec4;
+
 use super::super::Ray;
 use crate::math::Vec3;
 
@@ -8,7 +10,7 @@ use crate::math::Vec3;
 #[repr(C, align(64))]
 pub struct Node {
     /// `bounds[0]` are the lower ends, `bounds[1]` the upper ones; by axis, then by child [unit].
-    bounds: [[[f32; 4]; 3]; 2],
+    bounds: [[Vec4; 3]; 2],
     /// [`Child`] of each box; those of empty boxes are never read.
     children: [u32; 4],
     /// How many children there are.
@@ -70,29 +72,32 @@ pub struct Entered {
 /// the three operations behind a distance to a slab.
 #[inline]
 pub fn widen(t: f32) -> f32 {
-    const HALF_ULP: f32 = 0.5 * f32::EPSILON;
-    const TWO_GAMMA_3: f32 = 2.0 * (3.0 * HALF_ULP) / (1.0 - 3.0 * HALF_ULP);
     t + t.abs() * TWO_GAMMA_3
 }
 
+const HALF_ULP: f32 = 0.5 * f32::EPSILON;
+const TWO_GAMMA_3: f32 = 2.0 * (3.0 * HALF_ULP) / (1.0 - 3.0 * HALF_ULP);
+
+/// `Vec4::max` and `Vec4::min` give the second of two numbers if one is not a number: true of SSE, not of other machines.
+const SECOND_IF_NAN: bool = cfg!(any(target_arch = "x86_64", target_arch = "x86"));
+
 /// The larger; `b` if `a` is not a number: the plane of a slab in which the ray lies bounds nothing.
 #[inline]
-fn larger(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
-    std::array::from_fn(|i| if a[i] > b[i] { a[i] } else { b[i] })
+fn larger(a: Vec4, b: Vec4) -> Vec4 {
+    if SECOND_IF_NAN { a.max(b) } else { Vec4::select(a.cmpgt(b), a, b) }
 }
 
 /// The smaller; `b` if `a` is not a number.
 #[inline]
-fn smaller(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
-    std::array::from_fn(|i| if a[i] < b[i] { a[i] } else { b[i] })
+fn smaller(a: Vec4, b: Vec4) -> Vec4 {
+    if SECOND_IF_NAN { a.min(b) } else { Vec4::select(a.cmplt(b), a, b) }
 }
 
 impl Node {
     /// A node of up to four children with their boxes (lower and upper corner).
     pub fn new(children: &[(Child, (Vec3, Vec3))]) -> Self {
         // An empty box has its ends exchanged at infinity: every ray leaves it before it enters.
-        let mut node =
-            Self { bounds: [[[f32::INFINITY; 4]; 3], [[f32::NEG_INFINITY; 4]; 3]], children: [0; 4], count: 0 };
+        let mut node = Self { bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], children: [0; 4], count: 0 };
         for (i, (child, (lower, upper))) in children.iter().enumerate() {
             for axis in 0..3 {
                 node.bounds[0][axis][i] = lower[axis];
@@ -107,19 +112,23 @@ impl Node {
     /// The boxes that the ray enters before `t_max`; none that it touches is left out.
     #[inline]
     pub fn enter(&self, ray: &NodeRay, t_max: f32) -> Entered {
-        let mut near = [ray.t_min; 4];
-        let mut far = [t_max; 4];
+        let mut near = Vec4::splat(ray.t_min);
+        let mut far = Vec4::splat(t_max);
         for axis in 0..3 {
-            let (origin, inverse, first) = (ray.origin[axis], ray.inverse[axis], ray.first[axis]);
-            near = larger(self.bounds[first][axis].map(|x| (x - origin) * inverse), near);
-            far = smaller(self.bounds[1 - first][axis].map(|x| (x - origin) * inverse), far);
+            let (origin, inverse) = (Vec4::splat(ray.origin[axis]), Vec4::splat(ray.inverse[axis]));
+            let first = ray.first[axis] & 1; // tells the compiler that it is no other
+            near = larger((self.bounds[first][axis] - origin) * inverse, near);
+            far = smaller((self.bounds[first ^ 1][axis] - origin) * inverse, far);
         }
-        let inside: [bool; 4] = std::array::from_fn(|i| near[i] <= widen(far[i]));
+        let far = far + far.abs() * TWO_GAMMA_3; // `widen`
+        let mut inside = near.cmple(far).bitmask();
+        let near = near.to_array();
         let mut entered = Entered { boxes: [(0, 0.0); 4], count: 0 };
-        for i in 0..4 {
-            // Written always, counted if entered: no branch to mispredict.
+        while inside != 0 {
+            let i = inside.trailing_zeros() as usize & 3;
+            inside &= inside - 1;
             entered.boxes[entered.count & 3] = (self.children[i], near[i]);
-            entered.count += usize::from(inside[i]);
+            entered.count += 1;
         }
         entered
     }

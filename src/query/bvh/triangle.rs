@@ -5,6 +5,8 @@
 //! or zero: so no ray slips between them. Where the sign is zero, or f32 cannot hold the values, f64 decides: it holds the
 //! products exactly. Nothing here depends on the scale of the scene.
 
+use glam::Vec4;
+
 use super::super::Ray;
 use crate::math::Vec3;
 
@@ -15,7 +17,7 @@ pub const LANES: usize = 4;
 #[derive(Clone, Debug)]
 #[repr(C, align(16))]
 pub struct Pack {
-    corners: [[[f32; LANES]; 3]; 3],
+    corners: [[Vec4; 3]; 3],
 }
 
 /// A hit in a pack.
@@ -61,19 +63,21 @@ const F32_RANGE: std::ops::Range<f32> = 1e-30..1e30;
 
 /// The corners across the ray, by triangle.
 struct Sheared {
-    x: [[f32; LANES]; 3],
-    y: [[f32; LANES]; 3],
+    x: [Vec4; 3],
+    y: [Vec4; 3],
 }
 
-/// Barycentric weights times the determinant.
-type Edges = [[f32; LANES]; 3];
+/// One number for each corner of each triangle.
+type ByCorner = [Vec4; 3];
 
 impl Pack {
     /// A pack of one to four triangles.
     pub fn new(triangles: &[[Vec3; 3]]) -> Self {
         let of = |lane: usize| triangles.get(lane).unwrap_or(&triangles[0]);
         Self {
-            corners: std::array::from_fn(|c| std::array::from_fn(|axis| std::array::from_fn(|lane| of(lane)[c][axis]))),
+            corners: std::array::from_fn(|c| {
+                std::array::from_fn(|axis| Vec4::from_array(std::array::from_fn(|lane| of(lane)[c][axis])))
+            }),
         }
     }
 
@@ -81,25 +85,22 @@ impl Pack {
     #[inline]
     pub fn closest(&self, ray: &TriangleRay, t_min: f32, t_max: f32) -> Option<PackHit> {
         let [kx, ky, kz] = ray.axes;
-        let z: [[f32; LANES]; 3] = std::array::from_fn(|c| self.corners[c][kz].map(|p| p - ray.origin[kz]));
-        let across = |k: usize, shear: f32| -> [[f32; LANES]; 3] {
-            std::array::from_fn(|c| {
-                let p = &self.corners[c][k];
-                std::array::from_fn(|i| (p[i] - ray.origin[k]) - shear * z[c][i])
-            })
+        let from_origin = |c: usize, k: usize| self.corners[c][k] - Vec4::splat(ray.origin[k]);
+        let z: ByCorner = std::array::from_fn(|c| from_origin(c, kz));
+        let across = |k: usize, shear: f32| -> ByCorner {
+            std::array::from_fn(|c| from_origin(c, k) - Vec4::splat(shear) * z[c])
         };
         let sheared = Sheared { x: across(kx, ray.shear[0]), y: across(ky, ray.shear[1]) };
-        let edges: Edges = std::array::from_fn(|c| {
+        // Barycentric weights times the determinant.
+        let edges: ByCorner = std::array::from_fn(|c| {
             let (from, to) = ((c + 1) % 3, (c + 2) % 3);
-            std::array::from_fn(|i| sheared.x[to][i] * sheared.y[from][i] - sheared.y[to][i] * sheared.x[from][i])
+            sheared.x[to] * sheared.y[from] - sheared.y[to] * sheared.x[from]
         });
         // Outside if two edges have different signs; zeros and what is not a number are looked at again.
-        let mut candidates = 0_u32;
-        for i in 0..LANES {
-            let below = (edges[0][i] < 0.0) | (edges[1][i] < 0.0) | (edges[2][i] < 0.0);
-            let above = (edges[0][i] > 0.0) | (edges[1][i] > 0.0) | (edges[2][i] > 0.0);
-            candidates |= u32::from(!(below & above)) << i;
-        }
+        let [a, b, c] = edges;
+        let below = a.cmplt(Vec4::ZERO) | b.cmplt(Vec4::ZERO) | c.cmplt(Vec4::ZERO);
+        let above = a.cmpgt(Vec4::ZERO) | b.cmpgt(Vec4::ZERO) | c.cmpgt(Vec4::ZERO);
+        let mut candidates = !(below & above).bitmask() & 0b1111;
         let mut best = None;
         let mut t_max = t_max;
         while candidates != 0 {
@@ -117,7 +118,7 @@ impl Pack {
 
 /// Distance and weights of a triangle that the signs have not ruled out.
 #[inline]
-fn finish(sheared: &Sheared, edges: &Edges, z: &Edges, per_z: f32, lane: usize) -> Option<(f32, f32, f32)> {
+fn finish(sheared: &Sheared, edges: &ByCorner, z: &ByCorner, per_z: f32, lane: usize) -> Option<(f32, f32, f32)> {
     let e = edges.map(|edge| edge[lane]);
     let det = e[0] + e[1] + e[2];
     if e[0] == 0.0 || e[1] == 0.0 || e[2] == 0.0 || !F32_RANGE.contains(&det.abs()) {
@@ -131,7 +132,7 @@ fn finish(sheared: &Sheared, edges: &Edges, z: &Edges, per_z: f32, lane: usize) 
 
 /// The same in f64, signs and all.
 #[cold]
-fn finish_exactly(sheared: &Sheared, z: &Edges, per_z: f32, lane: usize) -> Option<(f32, f32, f32)> {
+fn finish_exactly(sheared: &Sheared, z: &ByCorner, per_z: f32, lane: usize) -> Option<(f32, f32, f32)> {
     let x = sheared.x.map(|x| f64::from(x[lane]));
     let y = sheared.y.map(|y| f64::from(y[lane]));
     let e: [f64; 3] = std::array::from_fn(|c| {
