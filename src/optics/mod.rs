@@ -3,10 +3,14 @@
 
 mod catalogue;
 mod fresnel;
+mod half_space;
 mod medium;
 mod moments;
+mod validity;
 
-pub use catalogue::{CATALOGUE, Measured, find};
+pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
 pub use fresnel::{reflect, reflectance, refract, transmittance};
 pub use medium::Medium;
+pub use half_space::Boundary;
 pub use moments::FresnelMoments;
+pub use validity::{ChannelOptics, Trust};
