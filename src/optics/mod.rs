@@ -5,8 +5,10 @@ mod catalogue;
 mod fresnel;
 mod medium;
 mod moments;
+mod phase;
 
 pub use catalogue::{CATALOGUE, Measured, find};
-pub use fresnel::{reflect, reflectance, refract, transmittance};
-pub use medium::Medium;
+pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
+pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;
+pub use phase::HenyeyGreenstein;
