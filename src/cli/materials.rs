@@ -50,7 +50,8 @@ fn table(rows: &[&Measured]) -> String {
     );
     for row in rows {
         let optics = row.optics();
-        let three = |f: &dyn Fn(&ChannelOptics) -> f64| optics.iter().map(|k| short(f(k))).collect::<Vec<_>>().join(" ");
+        let three =
+            |f: &dyn Fn(&ChannelOptics) -> f64| optics.iter().map(|k| short(f(k))).collect::<Vec<_>>().join(" ");
         let r = row.reflectance_isotropic().map(|r| format!("{r:.3}")).join(" ");
         let outside: String =
             optics.iter().zip("rgb".chars()).filter(|(k, _)| k.outside_diffusion()).map(|(_, c)| c).collect();

@@ -78,19 +78,8 @@ fn medium(args: &Args, row: Option<&Measured>) -> Result<Medium> {
     let (Some(s), Some(a), Some(eta)) = (args.sigma_s_prime, args.sigma_a, args.eta) else {
         return Err(Error::usage("give --material, or --sigma-s-prime, --sigma-a and --eta"));
     };
-    if !(args.g > -1.0 && args.g < 1.0) {
-        return Err(Error::usage(format!("--g {}: the mean cosine lies between -1 and 1, both excluded", args.g)));
-    }
-    if !(0.1..=10.0).contains(&eta) {
-        return Err(Error::usage(format!("--eta {eta}: n_inside / n_outside lies in 0.1..10")));
-    }
-    let g = args.g as f32;
-    Ok(Medium {
-        sigma_a: Rgb(a.map(|v| v as f32)),
-        sigma_s: Rgb(s.map(|v| (v / (1.0 - f64::from(g))) as f32)),
-        g,
-        eta: eta as f32,
-    })
+    let sigma_s = Rgb(s.map(|v| (v / (1.0 - args.g)) as f32));
+    Medium::unreduced(sigma_s, Rgb(a.map(|v| v as f32)), args.g, eta as f32).map_err(|e| Error::usage(e.to_string()))
 }
 
 fn half_space_models() -> Vec<ModelName> {
@@ -146,7 +135,8 @@ fn unit(text: &str) -> std::result::Result<(&'static str, f64), String> {
 }
 
 fn radii(text: &str) -> std::result::Result<Radii, String> {
-    let why = "first radius, last radius and their number, such as 0.01:100:200, with 0 < first < last and 2 to 100000 radii";
+    let why =
+        "first radius, last radius and their number, such as 0.01:100:200, with 0 < first < last and 2 to 100000 radii";
     let words: Vec<&str> = text.split(':').collect();
     let [first, last, n] = words[..] else { return Err(why.to_owned()) };
     match (first.parse::<f64>(), last.parse::<f64>(), n.parse::<usize>()) {

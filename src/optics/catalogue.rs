@@ -133,9 +133,7 @@ impl Measured {
         let (sigma_s_prime, sigma_a, g) = (self.sigma_s_prime_per_mm(), self.sigma_a_per_mm(), self.g());
         let scattering = sigma_s_prime.iter().zip(g).filter(|&(&s, _)| s > 0.0).map(|(_, g)| g);
         let mean_g = scattering.clone().sum::<f64>() / (scattering.count() as f64).max(1.0);
-        // The rounded g, so that σ_s (1 - g) gives σ_s′ back.
-        let mean_g = mean_g as f32;
-        let sigma_s = |c: usize| (sigma_s_prime[c] * unit_in_mm / (1.0 - f64::from(mean_g))) as f32;
+        let sigma_s = |c: usize| (sigma_s_prime[c] * unit_in_mm / (1.0 - mean_g)) as f32;
         Medium {
             sigma_a: Rgb::from_fn(|c| (sigma_a[c] * unit_in_mm) as f32),
             sigma_s: Rgb::from_fn(sigma_s),

@@ -1,10 +1,11 @@
 //! The reference against which coefficients are checked: reflectance of a half space from the transfer equation itself.
 //!
 //! Isotropic scattering, smooth boundary, normal incidence. Without the boundary the reflected radiance is known in
-//! closed form through Chandrasekhar's H function [CHA60]; the boundary sends part of it back, which makes one linear
+//! closed form through Chandrasekhar's H function [Cha60]; the boundary sends part of it back, which makes one linear
 //! equation for the radiance that arrives from inside. No diffusion theory anywhere.
 
 use super::fresnel;
+use crate::math::GaussLegendre;
 
 /// Gauss points on each side of the critical angle.
 const POINTS: usize = 24;
@@ -28,7 +29,7 @@ impl Boundary {
         // substitution mu = mu_c + (1 - mu_c) u² that resolves the boundary layer above.
         let mu_c = if eta > 1.0 { (1.0 - 1.0 / (eta * eta)).sqrt() } else { 0.0 };
         let mut nodes = Vec::with_capacity(2 * POINTS);
-        for (u, w) in gauss_legendre(POINTS) {
+        for (u, w) in GaussLegendre::new(POINTS).points_on(0.0, 1.0) {
             if mu_c > 0.0 {
                 nodes.push(Node { mu: mu_c * u, weight: mu_c * w, reflectance: 1.0 });
             }
@@ -102,46 +103,13 @@ impl Boundary {
 const MAX_ROUNDS: usize = 500;
 const TOLERANCE: f64 = 1e-12;
 
-/// In f32: 1e-7 is far below what a printed coefficient is good for.
 fn reflectance_inside(eta: f64, mu: f64) -> f64 {
-    f64::from(fresnel::reflectance(1.0 / eta as f32, mu as f32))
-}
-
-/// Nodes and weights of Gauss-Legendre quadrature on (0, 1), by Newton's method on the Legendre polynomial.
-fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
-    (0..n)
-        .map(|i| {
-            let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
-            let mut slope = 1.0;
-            for _ in 0..100 {
-                let (mut p, mut previous) = (1.0, 0.0);
-                for k in 0..n {
-                    let k = k as f64;
-                    (p, previous) = (((2.0 * k + 1.0) * x * p - k * previous) / (k + 1.0), p);
-                }
-                slope = n as f64 * (x * p - previous) / (x * x - 1.0);
-                let step = p / slope;
-                x -= step;
-                if step.abs() < 1e-15 {
-                    break;
-                }
-            }
-            (0.5 * (1.0 - x), 1.0 / ((1.0 - x * x) * slope * slope))
-        })
-        .collect()
+    fresnel::split(1.0 / eta, mu).reflectance
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn quadrature_is_exact_for_polynomials() {
-        for power in 0..2 * POINTS as i32 {
-            let sum: f64 = gauss_legendre(POINTS).iter().map(|(x, w)| w * x.powi(power)).sum();
-            assert!((sum * f64::from(power + 1) - 1.0).abs() < 1e-12, "x^{power}: {sum}");
-        }
-    }
 
     #[test]
     fn nothing_is_lost_without_absorption() {

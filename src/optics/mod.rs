@@ -6,11 +6,13 @@ mod fresnel;
 mod half_space;
 mod medium;
 mod moments;
+mod phase;
 mod validity;
 
 pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
-pub use fresnel::{reflect, reflectance, refract, transmittance};
-pub use medium::Medium;
+pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
 pub use half_space::Boundary;
+pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;
+pub use phase::HenyeyGreenstein;
 pub use validity::{ChannelOptics, Trust};

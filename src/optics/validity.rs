@@ -40,10 +40,7 @@ impl ChannelOptics {
 
     /// The three channels of `medium`, lengths in its unit.
     pub fn of(medium: &Medium) -> [Self; 3] {
-        let sigma_s_prime = medium.sigma_s_prime();
-        std::array::from_fn(|c| {
-            Self::new(f64::from(sigma_s_prime[c]), f64::from(medium.sigma_a[c]), f64::from(medium.g))
-        })
+        medium.channels().map(|k| Self::new(k.sigma_s_prime, k.sigma_a, medium.g))
     }
 
     /// Light is absorbed sooner than it is turned round: α′ < 0.5. No diffusion model means anything here.

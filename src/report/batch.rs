@@ -191,23 +191,19 @@ impl Inputs {
                 return Err(Error::scene(format!("{name} = {value} is negative")));
             }
         }
-        if !(self.g > -1.0 && self.g < 1.0) {
-            return Err(Error::scene(format!("g = {}: the mean cosine lies between -1 and 1, both excluded", self.g)));
-        }
-        if !(0.1..=10.0).contains(&self.eta) {
-            return Err(Error::scene(format!("eta = {}: n_inside / n_outside lies in 0.1..10", self.eta)));
-        }
         if self.thickness <= 0.0 {
             return Err(Error::scene(format!("thickness = {} is not positive", self.thickness)));
         }
         let sigma_t_prime = self.sigma_s * (1.0 - self.g) + self.sigma_a;
         let length = if sigma_t_prime > 0.0 { (-sigma_t_prime.log2()).round().exp2() } else { 1.0 };
         let per_length = |sigma: f64| Rgb::splat((sigma * length) as f32);
-        // The g that the medium keeps, and the σ_s that gives σ_s′ back with it.
-        let g = (self.g as f32).clamp(f32::EPSILON - 1.0, 1.0 - f32::EPSILON / 2.0);
-        let sigma_s = self.sigma_s * (1.0 - self.g) / (1.0 - f64::from(g));
-        let medium =
-            Medium { sigma_a: per_length(self.sigma_a), sigma_s: per_length(sigma_s), g, eta: self.eta as f32 };
+        let medium = Medium {
+            sigma_a: per_length(self.sigma_a),
+            sigma_s: per_length(self.sigma_s),
+            g: self.g,
+            eta: self.eta as f32,
+        }
+        .checked()?;
         Ok(Prepared {
             model: Model::new(options.model, &medium, options.exit_normalisation),
             length,
@@ -242,12 +238,7 @@ impl Position {
             }
             Ok(Vec3::from(a.map(|c| c as f32)))
         };
-        Ok(Self {
-            x: vector(0),
-            n_i: unit(3, "nix,niy,niz")?,
-            n_o: unit(6, "nox,noy,noz")?,
-            w: unit(9, "wx,wy,wz")?,
-        })
+        Ok(Self { x: vector(0), n_i: unit(3, "nix,niy,niz")?, n_o: unit(6, "nox,noy,noz")?, w: unit(9, "wx,wy,wz")? })
     }
 }
 

@@ -128,18 +128,21 @@ impl Axis {
             Scale::Log => {
                 let (first, last) = (self.min.log10().ceil() as i32, self.max.log10().floor() as i32);
                 let every = ((last - first) / 8 + 1).max(1);
+                let plain = (-2..=3).contains(&first) && (-2..=3).contains(&last);
                 let (mut major, mut minor) = (Vec::new(), Vec::new());
                 for decade in first - 1..=last {
                     let value = 10f64.powi(decade);
                     if decade >= first {
                         if (decade - first) % every == 0 {
-                            major.push((value, power_of_ten(decade)));
+                            major.push((value, power_of_ten(decade, plain)));
                         } else {
                             minor.push(value);
                         }
                     }
                     if every == 1 {
-                        minor.extend((2..10).map(|k| f64::from(k) * value).filter(|v| (self.min..=self.max).contains(v)));
+                        minor.extend(
+                            (2..10).map(|k| f64::from(k) * value).filter(|v| (self.min..=self.max).contains(v)),
+                        );
                     }
                 }
                 (major, minor)
@@ -154,10 +157,12 @@ fn nice_step(rough: f64) -> f64 {
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * power).find(|&step| step >= rough * 0.999).unwrap_or(10.0 * power)
 }
 
-/// 0.01, 1, 100 or 10 with a raised exponent.
-fn power_of_ten(decade: i32) -> String {
+/// The number itself, or 10 with a raised exponent.
+fn power_of_ten(decade: i32, plain: bool) -> String {
     match decade {
-        -2..=2 => format!("{}", 10f64.powi(decade)),
+        _ if plain => format!("{}", 10f64.powi(decade)),
+        0 => "1".to_owned(),
+        1 => "10".to_owned(),
         _ => {
             let raised = |c: char| match c {
                 '-' => '⁻',
@@ -372,11 +377,11 @@ mod tests {
     fn ticks_are_where_readers_expect_them() {
         let log = Axis { label: String::new(), min: 0.02, max: 3e4, scale: Scale::Log };
         let labels: Vec<String> = log.ticks().0.into_iter().map(|t| t.1).collect();
-        assert_eq!(labels, ["0.1", "1", "10", "100", "10³", "10⁴"]);
+        assert_eq!(labels, ["10⁻¹", "1", "10", "10²", "10³", "10⁴"]);
         let linear = Axis { label: String::new(), min: 0.0, max: 2.0, scale: Scale::Linear };
         let labels: Vec<String> = linear.ticks().0.into_iter().map(|t| t.1).collect();
         assert_eq!(labels, ["0.0", "0.5", "1.0", "1.5", "2.0"]);
-        assert_eq!(power_of_ten(-12), "10⁻¹²");
+        assert_eq!(power_of_ten(-12, false), "10⁻¹²");
     }
 
     #[test]

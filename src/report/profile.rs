@@ -72,9 +72,8 @@ impl Profile {
             let more = more.map_or([0.0; 3], |f| f(r));
             std::array::from_fn(|c| f64::from(s_d[c]) * exit_factor + more[c])
         };
-        let ring_flux = std::array::from_fn(|c| {
-            self.rings(self.runs[c]).map(|ring| ring_sum(&ring, |r| exitance(r)[c])).collect()
-        });
+        let ring_flux =
+            std::array::from_fn(|c| self.rings(self.runs[c]).map(|ring| ring_sum(&ring, |r| exitance(r)[c])).collect());
         let total = model.total();
         self.curves.push(Curve {
             name: name.to_owned(),
@@ -114,7 +113,8 @@ impl Profile {
         let unit = &self.unit;
         let mut out = String::new();
         let _ = writeln!(out, "# {}", self.title);
-        let _ = writeln!(out, "# exitance M [1/{unit}^2] of a half space per entered flux, normal incidence; r [{unit}]");
+        let _ =
+            writeln!(out, "# exitance M [1/{unit}^2] of a half space per entered flux, normal incidence; r [{unit}]");
         for c in self.channels() {
             let k = self.optics()[c];
             let name = self.channel_name(c);
@@ -204,9 +204,10 @@ impl Profile {
 
     fn panel_title(&self, c: usize) -> String {
         let k = self.optics()[c];
-        let length = |value: f64| if value.is_finite() { format!("{} {}", short(value), self.unit) } else { "∞".into() };
+        let length =
+            |value: f64| if value.is_finite() { format!("{} {}", short(value), self.unit) } else { "∞".into() };
         format!(
-            "{}: α′ = {:.4}, ℓ′ = {}, 1/σ_tr = {}",
+            "{}: α′ = {:.4}, ℓ′ = {}, 1/σₜᵣ = {}",
             self.channel_name(c),
             k.alpha_prime,
             length(k.transport_mean_free_path),
