@@ -3,12 +3,14 @@
 
 mod catalogue;
 mod fresnel;
+mod inversion;
 mod medium;
 mod moments;
 mod phase;
 
 pub use catalogue::{CATALOGUE, Measured, find};
 pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
+pub use inversion::{AlbedoCurve, AlbedoLaw, better_total, medium_from_colour, standard_total};
 pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;
 pub use phase::HenyeyGreenstein;
