@@ -4,6 +4,7 @@
 mod catalogue;
 mod fresnel;
 mod half_space;
+mod inversion;
 mod medium;
 mod moments;
 mod phase;
@@ -12,6 +13,7 @@ mod validity;
 pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
 pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
 pub use half_space::Boundary;
+pub use inversion::{AlbedoCurve, AlbedoLaw, better_total, medium_from_colour, standard_total};
 pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;
 pub use phase::HenyeyGreenstein;
