@@ -2,10 +2,22 @@
 //! Not for: Fresnel factors of entry and exit (the cache applies each once), light sources, geometry queries.
 //! Read first: [`Bssrdf`], the contract of every model; then `standard.rs`.
 
+mod beam;
+mod channel;
+mod depth;
+mod directional;
+mod quadrature;
+mod single;
 mod standard;
+mod true_albedo;
 
 use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
+pub use beam::{BeamChannel, KappaExtinction, PhotonBeamDiffusion};
+pub use channel::ChannelMedium;
+pub use depth::DepthLaw;
+pub use directional::{DirectionalChannel, DirectionalDipole};
+pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
 pub use standard::StandardDipole;
 
 /// Where and how light goes in.
@@ -57,16 +69,22 @@ pub trait Bssrdf: Sync {
 pub enum ModelName {
     /// [`StandardDipole`].
     Standard,
+    /// [`DirectionalDipole`].
+    Directional,
+    /// [`PhotonBeamDiffusion`].
+    Beam,
 }
 
 impl ModelName {
     /// All models.
-    pub const ALL: [Self; 1] = [Self::Standard];
+    pub const ALL: [Self; 3] = [Self::Standard, Self::Directional, Self::Beam];
 
     /// The name in scene files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Standard => "standard",
+            Self::Directional => "directional",
+            Self::Beam => "beam",
         }
     }
 }
@@ -86,6 +104,10 @@ impl std::str::FromStr for ModelName {
 pub enum Model {
     /// See [`StandardDipole`].
     Standard(StandardDipole),
+    /// See [`DirectionalDipole`].
+    Directional(DirectionalDipole),
+    /// See [`PhotonBeamDiffusion`].
+    Beam(PhotonBeamDiffusion),
 }
 
 /// Generic work over whichever model is there.
@@ -102,6 +124,10 @@ impl Model {
     pub fn new(name: ModelName, medium: &Medium, exit_normalisation: bool) -> Self {
         match name {
             ModelName::Standard => Self::Standard(StandardDipole::new(medium, exit_normalisation)),
+            ModelName::Directional => Self::Directional(DirectionalDipole::new(medium, false)),
+            ModelName::Beam => {
+                Self::Beam(PhotonBeamDiffusion::new(medium, exit_normalisation, KappaExtinction::default()))
+            }
         }
     }
 
@@ -109,6 +135,8 @@ impl Model {
     pub fn visit<V: ModelVisitor>(&self, visitor: V) -> V::Out {
         match self {
             Self::Standard(model) => visitor.visit(model),
+            Self::Directional(model) => visitor.visit(model),
+            Self::Beam(model) => visitor.visit(model),
         }
     }
 }
