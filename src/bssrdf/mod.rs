@@ -3,20 +3,32 @@
 //! Read first: [`Bssrdf`], the contract of every model; then `standard.rs`.
 
 mod auto;
+mod beam;
 mod better;
+mod channel;
+mod depth;
+mod directional;
 mod multipole;
 mod normalised;
+mod quadrature;
 mod radial;
+mod single;
 mod slab;
 mod standard;
+mod true_albedo;
 
 use crate::error::{Error, Result};
 use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
 pub use auto::{Choice, choose};
+pub use beam::{BeamChannel, KappaExtinction, PhotonBeamDiffusion};
 pub use better::BetterDipole;
+pub use channel::ChannelMedium;
+pub use depth::DepthLaw;
+pub use directional::{DirectionalChannel, DirectionalDipole};
 pub use normalised::{NormalisedDiffusion, WidthFit};
 pub use radial::{EntryColumns, Gather, Radial};
+pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
 pub use slab::Slab;
 pub use standard::StandardDipole;
 
@@ -87,6 +99,10 @@ pub enum ModelName {
     Standard,
     /// [`BetterDipole`].
     Better,
+    /// [`DirectionalDipole`].
+    Directional,
+    /// [`PhotonBeamDiffusion`].
+    Beam,
     /// [`NormalisedDiffusion`].
     Normalised,
     /// [`Slab`]; needs a thickness.
@@ -97,7 +113,8 @@ pub enum ModelName {
 
 impl ModelName {
     /// All models, and `auto`.
-    pub const ALL: [Self; 5] = [Self::Standard, Self::Better, Self::Normalised, Self::Slab, Self::Auto];
+    pub const ALL: [Self; 7] =
+        [Self::Standard, Self::Better, Self::Directional, Self::Beam, Self::Normalised, Self::Slab, Self::Auto];
 
     /// The name in scene files and on the command line.
     pub fn name(self) -> &'static str {
@@ -107,6 +124,8 @@ impl ModelName {
             Self::Normalised => "normalised",
             Self::Slab => "slab",
             Self::Auto => "auto",
+            Self::Directional => "directional",
+            Self::Beam => "beam",
         }
     }
 }
@@ -132,6 +151,10 @@ pub enum Model {
     Normalised(NormalisedDiffusion),
     /// See [`Slab`].
     Slab(Box<Slab>),
+    /// See [`DirectionalDipole`].
+    Directional(DirectionalDipole),
+    /// See [`PhotonBeamDiffusion`].
+    Beam(PhotonBeamDiffusion),
 }
 
 /// Generic work over whichever model is there.
@@ -153,6 +176,10 @@ impl Model {
             ModelName::Standard | ModelName::Slab => Self::Standard(StandardDipole::new(medium, exit_normalisation)),
             ModelName::Better => Self::Better(BetterDipole::new(medium, exit_normalisation)),
             ModelName::Normalised => Self::Normalised(NormalisedDiffusion::new(medium, exit_normalisation)),
+            ModelName::Directional => Self::Directional(DirectionalDipole::new(medium, false)),
+            ModelName::Beam => {
+                Self::Beam(PhotonBeamDiffusion::new(medium, exit_normalisation, KappaExtinction::default()))
+            }
             // `choose` never answers `Auto`.
             ModelName::Auto => Self::new(choose(medium, None).name, medium, exit_normalisation),
         }
@@ -200,6 +227,8 @@ impl Model {
             Self::Standard(_) => ModelName::Standard,
             Self::Better(_) => ModelName::Better,
             Self::Normalised(_) => ModelName::Normalised,
+            Self::Directional(_) => ModelName::Directional,
+            Self::Beam(_) => ModelName::Beam,
             Self::Slab(_) => ModelName::Slab,
         }
     }
@@ -211,6 +240,7 @@ impl Model {
             Self::Better(model) => Some(model),
             Self::Normalised(model) => Some(model),
             Self::Slab(model) => Some(&**model),
+            Self::Directional(_) | Self::Beam(_) => None,
         }
     }
 
@@ -220,7 +250,7 @@ impl Model {
             Self::Standard(model) => Some(model),
             Self::Better(model) => Some(model),
             Self::Normalised(model) => Some(model),
-            Self::Slab(_) => None,
+            Self::Slab(_) | Self::Directional(_) | Self::Beam(_) => None,
         }
     }
 
@@ -231,6 +261,8 @@ impl Model {
             Self::Better(model) => visitor.visit(model),
             Self::Normalised(model) => visitor.visit(model),
             Self::Slab(model) => visitor.visit(&**model),
+            Self::Directional(model) => visitor.visit(model),
+            Self::Beam(model) => visitor.visit(model),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! `marmor eval`.
 
-use marmor::bssrdf::ModelName;
+use marmor::bssrdf::{KappaExtinction, ModelName};
 use marmor::report::{Batch, BatchOptions};
 use marmor::{Error, Result};
 use std::io::{self, BufRead, Write};
@@ -11,7 +11,8 @@ use std::process::ExitCode;
 ///
 /// The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (plane, normal incidence; M(r)
 /// per entered flux is appended too, as `exitance`) or x,y,z (exit minus entry), nix,niy,niz, nox,noy,noz (unit
-/// normals), wx,wy,wz (refracted direction inside). Model `slab` also needs `thickness`. Other columns pass through.
+/// normals), wx,wy,wz (refracted direction inside). Model `slab` also needs `thickness` and takes `eta_far`. Other columns
+/// pass through. Results come last, so that they win where a column of the input has the same name.
 #[derive(clap::Args)]
 pub struct Args {
     /// BSSRDF model
@@ -20,6 +21,18 @@ pub struct Args {
     /// Leave out the factor that keeps the exit Fresnel term from losing energy: S_d = R_d / π, as the papers print it
     #[arg(long)]
     no_exit_normalisation: bool,
+    /// Model `directional`: scale to the true albedo of the half space
+    #[arg(long)]
+    calibrated: bool,
+    /// Model `beam`: σ_t instead of σ_t′ in the near-field correction
+    #[arg(long)]
+    kappa_full: bool,
+    /// Model `slab`, rows with r: light that leaves by the far face
+    #[arg(long)]
+    transmitted: bool,
+    /// Append exact single scattering on a plane too [1/unit²], as `single`
+    #[arg(long)]
+    single: bool,
 }
 
 /// Results are written when this many bytes are there.
@@ -27,7 +40,23 @@ const BUFFER: usize = 1 << 18;
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let options = BatchOptions { model: args.model, exit_normalisation: !args.no_exit_normalisation };
+    let refuse = |given: bool, option: &str, model: ModelName| {
+        if given && args.model != model {
+            return Err(Error::usage(format!("{option} goes with --model {}", model.name())));
+        }
+        Ok(())
+    };
+    refuse(args.calibrated, "--calibrated", ModelName::Directional)?;
+    refuse(args.kappa_full, "--kappa-full", ModelName::Beam)?;
+    refuse(args.transmitted, "--transmitted", ModelName::Slab)?;
+    let options = BatchOptions {
+        model: args.model,
+        exit_normalisation: !args.no_exit_normalisation,
+        calibrated: args.calibrated,
+        kappa: if args.kappa_full { KappaExtinction::Full } else { KappaExtinction::Reduced },
+        transmitted: args.transmitted,
+        single: args.single,
+    };
     let mut input = io::BufReader::with_capacity(BUFFER, io::stdin().lock());
     let mut output = io::stdout().lock();
     let mut out = String::with_capacity(BUFFER + 4096);
@@ -80,7 +109,7 @@ fn evaluate(
             }
             None => Batch::new(row, options).map(|new| {
                 out.push_str(row);
-                out.push_str(new.appended());
+                out.push_str(&new.appended());
                 batch = Some(new);
             }),
             Some(batch) => batch.row(row, out).map_err(|e| e.within(format_args!("standard input, line {number}"))),

@@ -83,7 +83,7 @@ fn medium(args: &Args, row: Option<&Measured>) -> Result<Medium> {
 }
 
 fn half_space_models() -> Vec<ModelName> {
-    ModelName::ALL.into_iter().filter(|m| m.name() != "slab" && m.name() != "auto").collect()
+    ModelName::ALL.into_iter().filter(|m| !matches!(m, ModelName::Slab | ModelName::Auto)).collect()
 }
 
 struct Add<'a> {
@@ -94,7 +94,7 @@ struct Add<'a> {
 impl ModelVisitor for Add<'_> {
     type Out = ();
     fn visit<B: Bssrdf>(self, model: &B) {
-        self.profile.add(self.name.name(), model, None);
+        self.profile.add(self.name.name(), model);
     }
 }
 

@@ -1,8 +1,11 @@
 //! Rows of a CSV in, the same rows with S_d out: the models' rendering code for scripts and tests.
 
-use crate::bssrdf::{Bssrdf, Entry, Exit, Model, ModelName, ModelVisitor};
+use crate::bssrdf::{
+    Bssrdf, ChannelMedium, DirectionalDipole, Entry, Exit, KappaExtinction, Model, ModelName, ModelVisitor,
+    PhotonBeamDiffusion, SingleChannel, Slab,
+};
 use crate::error::did_you_mean;
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{FresnelMoments, Medium};
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -20,14 +23,36 @@ pub struct BatchOptions {
     pub model: ModelName,
     /// See [`Model::new`].
     pub exit_normalisation: bool,
+    /// `directional` scaled to the true albedo.
+    pub calibrated: bool,
+    /// The extinction in the near-field correction of `beam`.
+    pub kappa: KappaExtinction,
+    /// Rows with r: exit by the far face of the `slab`.
+    pub transmitted: bool,
+    /// Append exact single scattering too: exitance of a plane [1/unit²] per entered flux.
+    pub single: bool,
+}
+
+impl BatchOptions {
+    /// `model` as a scene would use it.
+    pub fn new(model: ModelName) -> Self {
+        Self {
+            model,
+            exit_normalisation: true,
+            calibrated: false,
+            kappa: KappaExtinction::default(),
+            transmitted: false,
+            single: false,
+        }
+    }
 }
 
 /// Evaluates rows under one header.
 pub struct Batch {
     options: BatchOptions,
     columns: Columns,
-    models: HashMap<[u64; 5], Prepared>,
-    last: [u64; 5],
+    models: HashMap<[u64; 6], Prepared>,
+    last: [u64; 6],
     fields: Vec<(usize, usize)>,
 }
 
@@ -36,8 +61,9 @@ struct Prepared {
     model: Model,
     /// That unit: a power of two, which moves no digit of the input.
     length: f64,
-    /// π 4 C_phi(1/eta): exitance over S_d.
+    /// M over S_d: π 4 C_phi(1/eta) of the face it leaves by, or π without exit normalisation.
     exit_factor: f64,
+    single: SingleChannel,
 }
 
 /// Where the inputs stand in a row.
@@ -47,6 +73,7 @@ struct Columns {
     g: usize,
     eta: usize,
     thickness: Option<usize>,
+    eta_far: Option<usize>,
     place: Place,
     count: usize,
 }
@@ -70,15 +97,13 @@ impl Batch {
         split(header, &mut fields);
         let names: Vec<&str> = fields.iter().map(|&(a, b)| field(header, a, b)).collect();
         let columns = Columns::new(&names, options.model)?;
-        Ok(Self { options, columns, models: HashMap::new(), last: [0; 5], fields })
+        Ok(Self { options, columns, models: HashMap::new(), last: [0; 6], fields })
     }
 
     /// Names of the columns that [`Self::row`] appends, with the comma before each.
-    pub fn appended(&self) -> &'static str {
-        match self.columns.place {
-            Place::Plane(_) => ",S_d,exitance",
-            Place::General(_) => ",S_d",
-        }
+    pub fn appended(&self) -> String {
+        let exitance = if matches!(self.columns.place, Place::Plane(_)) { ",exitance" } else { "" };
+        format!(",S_d{exitance}{}", if self.options.single { ",single" } else { "" })
     }
 
     /// Writes `row` with its results to `out`, without a line end. S_d is in 1/(unit² sr), exitance in 1/unit² per
@@ -106,10 +131,13 @@ impl Batch {
             sigma_a: number(columns.sigma_a, "sigma_a")?,
             g: number(columns.g, "g")?,
             eta: number(columns.eta, "eta")?,
-            thickness: columns.thickness.map_or(Ok(f64::INFINITY), |c| number(c, "thickness"))?,
+            thickness: columns.thickness.map(|c| number(c, "thickness")).transpose()?,
+            eta_far: columns.eta_far.map(|c| number(c, "eta_far")).transpose()?,
         };
         let place = match &columns.place {
-            Place::Plane(r) => Position::plane(number(*r, "r")?)?,
+            Place::Plane(r) => {
+                Position::plane(number(*r, "r")?, medium.thickness.filter(|_| self.options.transmitted))?
+            }
             Place::General(at) => {
                 let mut v = [0.0; 12];
                 for ((value, &column), name) in v.iter_mut().zip(at).zip(GENERAL) {
@@ -137,6 +165,9 @@ impl Batch {
         if exitance_too {
             let _ = write!(out, ",{:.9e}", s_d * prepared.exit_factor);
         }
+        if self.options.single {
+            let _ = write!(out, ",{:.9e}", prepared.single(&place));
+        }
         Ok(())
     }
 }
@@ -159,16 +190,14 @@ impl Columns {
             let either = at("r").map_or("r` (or `x,y,z,nix,niy,niz,nox,noy,noz,wx,wy,wz`)", |_| "r");
             Place::Plane(need(either))
         };
-        let thickness = if needs_thickness(model) { Some(need("thickness")) } else { None };
+        let (slab, heeds) = (model == ModelName::Slab, model == ModelName::Slab || model == ModelName::Auto);
+        let thickness = if slab { Some(need("thickness")) } else { at("thickness").filter(|_| heeds) };
+        let eta_far = at("eta_far").filter(|_| slab);
         if missing.is_empty() {
-            return Ok(Self { sigma_s, sigma_a, g, eta, thickness, place, count: names.len() });
+            return Ok(Self { sigma_s, sigma_a, g, eta, thickness, eta_far, place, count: names.len() });
         }
         Err(Error::usage(format!("standard input, line 1: the header lacks {}", missing.join(", "))))
     }
-}
-
-fn needs_thickness(model: ModelName) -> bool {
-    model.name() == "slab"
 }
 
 /// The medium of a row, as typed.
@@ -177,12 +206,14 @@ struct Inputs {
     sigma_a: f64,
     g: f64,
     eta: f64,
-    thickness: f64,
+    thickness: Option<f64>,
+    eta_far: Option<f64>,
 }
 
 impl Inputs {
-    fn key(&self) -> [u64; 5] {
-        [self.sigma_s, self.sigma_a, self.g, self.eta, self.thickness].map(f64::to_bits)
+    fn key(&self) -> [u64; 6] {
+        let far = [self.thickness, self.eta_far].map(|v| v.unwrap_or(0.0));
+        [self.sigma_s, self.sigma_a, self.g, self.eta, far[0], far[1]].map(f64::to_bits)
     }
 
     fn prepare(&self, options: BatchOptions) -> Result<Prepared> {
@@ -191,8 +222,8 @@ impl Inputs {
                 return Err(Error::scene(format!("{name} = {value} is negative")));
             }
         }
-        if self.thickness <= 0.0 {
-            return Err(Error::scene(format!("thickness = {} is not positive", self.thickness)));
+        if let Some(thickness) = self.thickness.filter(|t| *t <= 0.0) {
+            return Err(Error::scene(format!("thickness = {thickness} is not positive")));
         }
         let sigma_t_prime = self.sigma_s * (1.0 - self.g) + self.sigma_a;
         let length = if sigma_t_prime > 0.0 { (-sigma_t_prime.log2()).round().exp2() } else { 1.0 };
@@ -204,11 +235,28 @@ impl Inputs {
             eta: self.eta as f32,
         }
         .checked()?;
-        Ok(Prepared {
-            model: Model::new(options.model, &medium, options.exit_normalisation),
-            length,
-            exit_factor: std::f64::consts::PI * FresnelMoments::new(self.eta).four_c_phi_outside,
-        })
+        let thickness = self.thickness.map(|t| (t / length) as f32);
+        let eta_far = self.eta_far.unwrap_or(self.eta);
+        let normalised = options.exit_normalisation;
+        let model = match (options.model, thickness) {
+            (ModelName::Directional, _) => Model::Directional(DirectionalDipole::new(&medium, options.calibrated)),
+            (ModelName::Beam, _) => Model::Beam(PhotonBeamDiffusion::new(&medium, normalised, options.kappa)),
+            (ModelName::Slab, Some(thickness)) => {
+                Model::Slab(Box::new(Slab::between(&medium, thickness, eta_far as f32, normalised)?))
+            }
+            (name, thickness) => Model::with_thickness(name, &medium, thickness, normalised)?,
+        };
+        // The directional dipole has the factor as published.
+        let normalised = normalised || model.name() == ModelName::Directional;
+        let eta = if options.transmitted { eta_far } else { self.eta };
+        let exit = if normalised { FresnelMoments::new(eta).four_c_phi_outside } else { 1.0 };
+        let single = SingleChannel::new(&ChannelMedium {
+            sigma_s: self.sigma_s * length,
+            sigma_a: self.sigma_a * length,
+            g: self.g,
+            eta: self.eta,
+        });
+        Ok(Prepared { model, length, exit_factor: std::f64::consts::PI * exit, single })
     }
 }
 
@@ -221,11 +269,13 @@ struct Position {
 }
 
 impl Position {
-    fn plane(r: f64) -> Result<Self> {
+    /// On the lit plane, or on the far face of a slab as thick as `through`.
+    fn plane(r: f64, through: Option<f64>) -> Result<Self> {
         if r < 0.0 {
             return Err(Error::scene(format!("r = {r} is negative")));
         }
-        Ok(Self { x: [r, 0.0, 0.0], n_i: Vec3::Z, n_o: Vec3::Z, w: -Vec3::Z })
+        let n_o = if through.is_some() { -Vec3::Z } else { Vec3::Z };
+        Ok(Self { x: [r, 0.0, -through.unwrap_or(0.0)], n_i: Vec3::Z, n_o, w: -Vec3::Z })
     }
 
     fn general(v: &[f64; 12]) -> Result<Self> {
@@ -257,6 +307,12 @@ impl Prepared {
         let exit = Exit { x, n: place.n_o, w: place.n_o };
         f64::from(self.model.visit(Eval(entry, exit))[0]) / (self.length * self.length)
     }
+
+    /// Exitance by single scattering on the plane through the entry [1/unit²].
+    fn single(&self, place: &Position) -> f64 {
+        let x = DVec3::from(place.x) / self.length;
+        self.single.exitance(x, place.n_i.as_dvec3(), place.w.as_dvec3()) / (self.length * self.length)
+    }
 }
 
 /// Start and end of each field of a CSV row; commas inside double quotes do not separate.
@@ -285,10 +341,12 @@ fn field(row: &str, start: usize, end: usize) -> &str {
 mod tests {
     use super::*;
 
-    const STANDARD: BatchOptions = BatchOptions { model: ModelName::Standard, exit_normalisation: true };
-
     fn run(header: &str, rows: &[&str]) -> Result<Vec<String>> {
-        let mut batch = Batch::new(header, STANDARD)?;
+        run_with(BatchOptions::new(ModelName::Standard), header, rows)
+    }
+
+    fn run_with(options: BatchOptions, header: &str, rows: &[&str]) -> Result<Vec<String>> {
+        let mut batch = Batch::new(header, options)?;
         rows.iter()
             .map(|row| {
                 let mut out = String::new();
@@ -361,6 +419,35 @@ mod tests {
         for out in run("sigma_s,sigma_a,g,eta,r", &rows).unwrap() {
             assert!(last(&out) >= 0.0 && last(&out).is_finite(), "{out}");
         }
+    }
+
+    #[test]
+    fn a_slab_needs_its_thickness_and_has_two_faces() {
+        let mut options = BatchOptions::new(ModelName::Slab);
+        let missing = run_with(options, "sigma_s,sigma_a,g,eta,r", &[]).unwrap_err().to_string();
+        assert!(missing.contains("lacks `thickness`"), "{missing}");
+        let header = "sigma_s,sigma_a,g,eta,r,thickness,eta_far";
+        let row = ["2,0.01,0,1.3,0.7,3,1.3"];
+        let reflected = last(&run_with(options, header, &row).unwrap()[0]);
+        options.transmitted = true;
+        let transmitted = last(&run_with(options, header, &row).unwrap()[0]);
+        assert!(transmitted > 0.0 && transmitted < reflected, "{transmitted} against {reflected}");
+        let thin = run_with(options, header, &["2,0.01,0,1.3,0.7,0.1,1.3"]).unwrap_err().to_string();
+        assert!(thin.contains("thickness"), "{thin}");
+    }
+
+    #[test]
+    fn single_scattering_is_appended_on_request() {
+        let mut options = BatchOptions::new(ModelName::Beam);
+        options.single = true;
+        let batch = Batch::new("sigma_s,sigma_a,g,eta,r", options).unwrap();
+        assert_eq!(batch.appended(), ",S_d,exitance,single");
+        // A row of the table of exact values, the coefficients in another unit.
+        let [mm, m] = [1.0, 1e-3].map(|unit| {
+            let row = format!("{},{},0.5,1.3,{}", 10.0 * unit, unit, 0.1 / unit);
+            last(&run_with(options, "sigma_s,sigma_a,g,eta,r", &[&row]).unwrap()[0]) / (unit * unit)
+        });
+        assert!(mm > 0.0 && (m / mm - 1.0).abs() < 1e-9);
     }
 
     #[test]

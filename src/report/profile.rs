@@ -3,8 +3,8 @@
 
 use super::monte_carlo::{Bin, Run, channel_run};
 use super::plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
-use crate::bssrdf::{Bssrdf, Entry, Exit};
-use crate::math::Vec3;
+use crate::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit, SingleChannel};
+use crate::math::{DVec3, Vec3};
 use crate::optics::{Boundary, ChannelOptics, FresnelMoments, Measured, Medium};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
@@ -62,24 +62,27 @@ impl Profile {
         &self.curves
     }
 
-    /// Adds `model`. `more` is exitance [1/unit²] that the model leaves out and that is added to it, per channel:
-    /// single scattering, or nothing. `name` says what it is.
-    pub fn add<B: Bssrdf>(&mut self, name: &str, model: &B, more: Option<&dyn Fn(f64) -> [f64; 3]>) {
+    /// Adds `model` under `name`, with exact single scattering where the model leaves it out; the curve's name says so.
+    pub fn add<B: Bssrdf>(&mut self, name: &str, model: &B) {
         let exit_factor = PI * FresnelMoments::new(f64::from(self.medium.eta)).four_c_phi_outside;
         let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z };
+        let single: Option<[SingleChannel; 3]> = (!model.claims().first_order)
+            .then(|| std::array::from_fn(|c| SingleChannel::new(&ChannelMedium::of(&self.medium, c))));
         let exitance = |r: f64| -> [f64; 3] {
             let s_d = model.eval(&entry, &Exit { x: Vec3::new(r as f32, 0.0, 0.0), n: Vec3::Z, w: Vec3::Z });
-            let more = more.map_or([0.0; 3], |f| f(r));
-            std::array::from_fn(|c| f64::from(s_d[c]) * exit_factor + more[c])
+            std::array::from_fn(|c| {
+                let once = single.map_or(0.0, |s| s[c].exitance(DVec3::new(r, 0.0, 0.0), DVec3::Z, -DVec3::Z));
+                f64::from(s_d[c]) * exit_factor + once
+            })
         };
         let ring_flux =
             std::array::from_fn(|c| self.rings(self.runs[c]).map(|ring| ring_sum(&ring, |r| exitance(r)[c])).collect());
         let total = model.total();
         self.curves.push(Curve {
-            name: name.to_owned(),
+            name: if single.is_some() { format!("{name} + single") } else { name.to_owned() },
             exitance: self.r.iter().map(|&r| exitance(r)).collect(),
             ring_flux,
-            total: std::array::from_fn(|c| f64::from(total[c])),
+            total: std::array::from_fn(|c| f64::from(total[c]) + single.map_or(0.0, |s| s[c].total())),
         });
     }
 
@@ -332,7 +335,7 @@ mod tests {
         let row = find("marble").unwrap();
         let medium = row.medium(1.0);
         let mut profile = Profile::new(medium, ("mm", 1.0), Some(row), Some(geometric((1e-4, 400.0), 4000)));
-        profile.add("standard", &StandardDipole::new(&medium, true), None);
+        profile.add("standard", &StandardDipole::new(&medium, true));
         let curve = &profile.curves()[0];
         for c in 0..3 {
             let r = profile.radii();
@@ -352,7 +355,7 @@ mod tests {
         let flux = |unit_in_mm: f64| {
             let medium = row.medium(unit_in_mm);
             let mut profile = Profile::new(medium, ("unit", unit_in_mm), Some(row), None);
-            profile.add("standard", &StandardDipole::new(&medium, true), None);
+            profile.add("standard", &StandardDipole::new(&medium, true));
             profile.curves()[0].ring_flux[1].clone()
         };
         for (mm, cm) in std::iter::zip(flux(1.0), flux(10.0)) {
