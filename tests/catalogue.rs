@@ -15,8 +15,7 @@ fn every_listed_reflectance_is_reproduced() {
         let Some(listed) = row.reflectance else { continue };
         rows += 1;
         let reference = row.reflectance_isotropic();
-        for c in 0..3 {
-            let (ours, theirs) = (reference[c], listed.value[c]);
+        for (c, (ours, theirs)) in std::iter::zip(reference, listed.value).enumerate() {
             assert!((ours - theirs).abs() <= TOLERANCE, "{} channel {c}: {ours:.4}, listed {theirs}", row.name);
         }
     }
@@ -33,10 +32,10 @@ fn a_slip_of_ten_in_any_absorption_is_noticed() {
             let (s, a) = (row.sigma_s_prime_per_mm()[c], row.sigma_a_per_mm()[c]);
             for slip in [0.1, 10.0] {
                 let slipped = boundary.reflectance(ChannelOptics::new(s, a * slip, 0.0).absorbed_prime);
-                // A reflectance within 0.03 of the end it is driven to cannot move far, and no absorption has no digits
-                // to slip.
-                let room = if slip > 1.0 { listed.value[c] } else { 1.0 - listed.value[c] };
-                if a == 0.0 || room < 0.03 {
+                // Where almost nothing or almost everything comes back, a slip moves the reflectance by less than the
+                // tolerance; and no absorption has no digits to slip.
+                let (dark, bright) = (listed.value[c] < 0.03, listed.value[c] > 0.97 && slip < 1.0);
+                if a == 0.0 || dark || bright {
                     continue;
                 }
                 tried += 1;
@@ -45,7 +44,7 @@ fn a_slip_of_ten_in_any_absorption_is_noticed() {
             }
         }
     }
-    assert_eq!(tried, 63);
+    assert_eq!(tried, 61);
 }
 
 /// The same rows, multiplied out by hand for the undiluted liquids as another public list has them [PJH16].

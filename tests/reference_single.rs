@@ -195,7 +195,7 @@ proptest! {
         prop_assert!(m.is_finite() && m >= 0.0, "{m}");
         let rgb = Rgb::splat(medium.sigma_s as f32);
         let single = SingleScattering::new(&Medium {
-            sigma_s: rgb, sigma_a: Rgb([medium.sigma_a as f32, 0.0, 1.0]), g: g, eta: eta as f32,
+            sigma_s: rgb, sigma_a: Rgb([medium.sigma_a as f32, 0.0, 1.0]), g, eta: eta as f32,
         });
         let s = single.sample_distance(u, log_r.exp() as f32).unwrap();
         prop_assert!(s.pdf > 0.0 && s.pdf.is_finite() && s.distance >= 0.0, "{s:?}");
