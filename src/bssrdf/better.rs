@@ -1,9 +1,9 @@
 //! The better dipole.
 
 use super::Claims;
-use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths};
+use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths, left};
 use super::standard::length;
-use crate::math::{Rgb, exp, exp_m1};
+use crate::math::{Rgb, exp_m1, times_exp};
 use crate::optics::{FresnelMoments, Medium, better_total};
 use std::f64::consts::PI;
 
@@ -90,12 +90,12 @@ impl Pair {
         let mut exponent = s * d_r;
         if COMPENSATED {
             let rate = rate * self.length;
-            exponent = (s - rate) * d_r + rate / (d_r + x2.sqrt());
+            exponent = left(s, rate) * d_r + rate / (d_r + x2.sqrt());
         }
         let m = exp_m1(-s * t);
         let fluence = (t * i_r - m) * i_v;
         let flux = (i_r + s) * (i_r * i_r) + self.z_virtual * (1.0 + m) * ((i_v + s) * (i_v * i_v));
-        self.scale * (self.fluence * fluence + self.flux * flux) * exp(-exponent)
+        times_exp(self.scale * (self.fluence * fluence + self.flux * flux), -exponent)
     }
 }
 

@@ -13,7 +13,7 @@ pub(super) struct Multipole {
 }
 
 /// Images of each kind summed one by one on each side; the rest is an integral.
-const PAIRS: i32 = 32;
+const PAIRS: i32 = 48;
 /// The Fourier series stands in for the images beyond this part of a period.
 const FAR: f64 = 0.25;
 

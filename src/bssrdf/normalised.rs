@@ -1,7 +1,7 @@
 //! Normalised diffusion.
 
 use super::Claims;
-use super::radial::{Channel, Channels, DistanceOnly, finite};
+use super::radial::{Channel, Channels, DistanceOnly, finite, left};
 use crate::error::{Error, Result};
 use crate::math::{Rgb, exp};
 use crate::optics::{FresnelMoments, Medium, standard_total};
@@ -137,11 +137,14 @@ impl NormalisedDiffusion {
     /// if `u` is uniform. In closed form: with y the real root of y³ + 3y = 4(1 - u), r = -3 d ln y.
     pub fn sample_radius(&self, channel: usize, u: f64) -> f64 {
         let d = self.widths[channel];
+        if u <= 0.0 {
+            return 0.0;
+        }
         let rest = 1.0 - u.clamp(0.0, 1.0 - f64::EPSILON);
         // y = 2 sinh(asinh(2 rest) / 3): Cardano without the difference of two cube roots.
         let x = -3.0 * (2.0 * ((2.0 * rest).asinh() / 3.0).sinh()).ln();
         // Small radii lose digits in the logarithm of a number near 1: one Newton step gives them back.
-        let x = if u > 0.0 && u < 0.25 {
+        let x = if u < 0.25 {
             let excess = -0.25 * (-x).exp_m1() - 0.75 * (-x / 3.0).exp_m1() - u;
             x - excess / (0.25 * ((-x).exp() + (-x / 3.0).exp()))
         } else {
@@ -162,17 +165,20 @@ impl Channel for Width {
     #[inline(always)]
     fn value(self, r2: f32) -> f32 {
         let r = self.outside_core(r2);
-        let y = exp(-(self.decay * r));
-        self.scale / r * (y + y * y * y)
+        // exp(-r/6d): its square may leave the range of f32 where the product with the scale does not.
+        let root = exp(-(0.5 * self.decay * r));
+        let y = root * root;
+        self.scale / r * (1.0 + y * y) * root * root
     }
 
     #[inline(always)]
     fn compensated(self, r2: f32, rate: f32) -> f32 {
         let r = self.outside_core(r2);
-        let y = exp(-(self.decay * r));
+        let root = exp(-(0.5 * self.decay * r));
+        let y = root * root;
         // exp(rate r) (y + y³) with the gain in the exponent.
-        let gained = exp(-((self.decay - rate) * r));
-        self.scale / r * (gained + gained * (y * y))
+        let gained = exp(-(0.5 * left(self.decay, rate) * r));
+        self.scale / r * (1.0 + y * y) * gained * gained
     }
 }
 

@@ -10,6 +10,9 @@ pub trait Radial: Bssrdf {
     /// 4 C_phi(1/eta) where S_d was divided by it.
     fn exitance(&self, r: f32) -> Rgb;
 
+    /// [`Self::exitance`] of one `channel`.
+    fn exitance_one(&self, channel: usize, r: f32) -> f32;
+
     /// M(r) of one `channel` for each `r` [unit], vectorised with `level` or the widest instruction set below it; the
     /// bits do not depend on it, and are those of [`Self::exitance`]. Extra items of the longer slice are left alone.
     fn exitance_batch_at(&self, level: Level, channel: usize, r: &[f32], out: &mut [f32]);
@@ -127,6 +130,11 @@ impl<M: DistanceOnly> Radial for M {
     fn exitance(&self, r: f32) -> Rgb {
         let k = self.channels();
         k.each_rgb(|c| c.value(r * r) * k.exitance)
+    }
+
+    fn exitance_one(&self, channel: usize, r: f32) -> f32 {
+        let k = self.channels();
+        k.each[channel].value(r * r) * k.exitance
     }
 
     fn exitance_batch_at(&self, level: Level, channel: usize, r: &[f32], out: &mut [f32]) {
@@ -258,6 +266,12 @@ pub(super) fn in_mean_free_paths(r2: f32, sigma_squared: f32) -> f32 {
     let x2 = r2 * sigma_squared;
     // Also where 0 · ∞ is not a number.
     if x2 < FARTHEST_SQUARED { x2 } else { FARTHEST_SQUARED }
+}
+
+/// What is left of a `decay` after a `rate` that is at most as large, but for rounding.
+#[inline(always)]
+pub(super) fn left(decay: f32, rate: f32) -> f32 {
+    if decay > rate { decay - rate } else { 0.0 }
 }
 
 /// `value` in f32, finite.

@@ -1,7 +1,7 @@
 //! The multipole: a slab between two boundaries.
 
 use super::multipole::Multipole;
-use super::radial::{Batch, Channel, FARTHEST_SQUARED, Radial, finite};
+use super::radial::{Batch, Channel, FARTHEST_SQUARED, Radial, finite, left};
 use super::standard::length;
 use super::{Bssrdf, Claims, Entry, Exit};
 use crate::error::{Error, Result};
@@ -195,7 +195,7 @@ impl Face {
         let mut exponent = self.decay * d;
         if COMPENSATED {
             let rate = rate * self.length;
-            exponent = (self.decay - rate) * d + rate * self.depth_squared / (d + x2.sqrt());
+            exponent = left(self.decay, rate) * d + rate * self.depth_squared / (d + x2.sqrt());
         }
         let bits = d2.to_bits();
         // Beyond the table the exponential is 0, so that a piece taken round the end does not matter.
@@ -232,15 +232,15 @@ impl Bssrdf for Slab {
     fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
         let x = exit.x - entry.x;
         let through = entry.n.dot(exit.n) < 0.0;
-        let straight = x.length();
-        let r2 = if through {
+        let (mut r2, mut rest) = (x.length_squared(), 0.0);
+        if through {
             let across = (entry.n - exit.n).normalize_or_zero();
-            (x - across * x.dot(across)).length_squared()
-        } else {
-            straight * straight
-        };
-        // The weight is of the straight distance; what is left of it joins at the end.
-        let rest = if through { rate * (straight - r2.sqrt()) } else { 0.0 };
+            let height = x.dot(across);
+            // The weight is of the straight distance: what it has more than r joins at the end.
+            let straight = r2.sqrt();
+            r2 = (x - across * height).length_squared();
+            rest = rate * (height * height) / (straight + r2.sqrt()).max(f32::MIN_POSITIVE);
+        }
         let faces = if through { &self.transmitted } else { &self.reflected };
         // Images of unlike boundaries can turn the far exitance negative: no light.
         let value = |face: &Face| times_exp(face.compensated(r2, rate), rest).max(0.0);
@@ -264,6 +264,10 @@ impl Radial for Slab {
     /// R(r) [1/unit²] on the lit face; [`Slab::transmitted`] is the other. Signed.
     fn exitance(&self, r: f32) -> Rgb {
         Rgb::from_fn(|c| (&self.reflected[c]).value(r * r) * self.exitance[0])
+    }
+
+    fn exitance_one(&self, channel: usize, r: f32) -> f32 {
+        (&self.reflected[channel]).value(r * r) * self.exitance[0]
     }
 
     fn exitance_batch_at(&self, level: Level, channel: usize, r: &[f32], out: &mut [f32]) {

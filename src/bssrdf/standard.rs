@@ -1,8 +1,8 @@
 //! The standard dipole.
 
 use super::Claims;
-use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths};
-use crate::math::{Rgb, exp};
+use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths, left};
+use crate::math::{Rgb, exp, times_exp};
 use crate::optics::{FresnelMoments, Medium, Reduced, standard_total};
 use std::f64::consts::PI;
 
@@ -31,6 +31,8 @@ pub struct Pole {
     decay: f32,
     /// z_v.
     z_virtual: f32,
+    /// z_v² - 1.
+    lift: f32,
     /// α′ σ_t′² / 4π, over π and the exit normalisation [1/(unit² sr)].
     scale: f32,
 }
@@ -46,6 +48,7 @@ impl StandardDipole {
             length: length(&k),
             decay: k.relative_decay() as f32,
             z_virtual: z_virtual as f32,
+            lift: ((z_virtual - 1.0) * (z_virtual + 1.0)) as f32,
             scale: finite(k.alpha_prime * k.sigma_t_prime * k.sigma_t_prime / (4.0 * PI * PI * exit)),
         });
         Self {
@@ -68,21 +71,22 @@ pub(super) fn length(k: &Reduced) -> f32 {
 impl Pole {
     #[inline(always)]
     fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32 {
+        let s = self.decay;
         let x2 = in_mean_free_paths(r2, self.sigma_squared);
         let (d_r, d_v) = ((x2 + 1.0).sqrt(), (x2 + self.z_virtual * self.z_virtual).sqrt());
-        let product = 1.0 / (d_r * d_v);
-        let (i_r, i_v) = (d_v * product, d_r * product);
-        // rate r - s d = -(s - rate) d - rate (d - r), and d - r = z² / (d + r): no cancellation far out.
-        let (mut e_r, mut e_v) = (self.decay * d_r, self.decay * d_v);
+        // One division for 1/d_r, 1/d_v and d_v - d_r, the last without cancellation.
+        let (sum, product) = (d_r + d_v, d_r * d_v);
+        let over = 1.0 / (sum * product);
+        let (i_r, i_v, t) = (over * (d_v * sum), over * (d_r * sum), self.lift * (over * product));
+        let mut exponent = s * d_r;
         if COMPENSATED {
-            let (x, rate) = (x2.sqrt(), rate * self.length);
-            e_r = (self.decay - rate) * d_r + rate / (d_r + x);
-            e_v = (self.decay - rate) * d_v + rate * self.z_virtual * self.z_virtual / (d_v + x);
+            // rate r - s d = -(s - rate) d - rate (d - r), and d - r = z² / (d + r): no cancellation far out.
+            let rate = rate * self.length;
+            exponent = left(s, rate) * d_r + rate / (d_r + x2.sqrt());
         }
         // z (1 + s d) / d³ as z (1/d + s) / d².
-        let real = (i_r + self.decay) * (i_r * i_r) * exp(-e_r);
-        let image = self.z_virtual * (i_v + self.decay) * (i_v * i_v) * exp(-e_v);
-        self.scale * (real + image)
+        let (real, image) = ((i_r + s) * (i_r * i_r), self.z_virtual * ((i_v + s) * (i_v * i_v)));
+        times_exp(self.scale * (real + image * exp(-s * t)), -exponent)
     }
 }
 

@@ -77,8 +77,9 @@ impl Outer {
         let integral = |extra: &dyn Fn(f64) -> f64| {
             rule.integrate_panels(0.0, end, panels, |u| {
                 let r_s = (-2.0 * u).exp();
-                let t = n * n * u.tanh();
-                let r_p = (t - 1.0) / (t + 1.0);
+                // n² tanh u ∓ 1; the difference keeps its digits for n beside 1.
+                let short = 2.0 * n * n / ((2.0 * u).exp() + 1.0);
+                let r_p = (b2 - short) / (b2 + 2.0 - short);
                 let reflectance = 0.5 * (r_s * r_s + r_p * r_p);
                 reflectance * b2 * u.sinh() * u.cosh() * extra(u)
             })

@@ -62,12 +62,11 @@ mod tests {
 
     #[test]
     fn it_integrates_to_one_with_mean_cosine_g() {
-        for g in G {
+        // Beside g = 1 a cosine in f64 cannot resolve the peak: 1 - cos is 1e-18 there.
+        for g in G.into_iter().filter(|g| *g < 0.999) {
             let phase = HenyeyGreenstein { g };
-            // Beside g = 1 a cosine in f64 cannot resolve the peak: 1 - cos is 1e-18 there.
-            let tolerance = if g > 0.999 { 0.5 } else { 1e-9 };
-            assert!((mean(phase, |_| 1.0) - 1.0).abs() < tolerance, "{g}: {}", mean(phase, |_| 1.0));
-            assert!((mean(phase, |c| c) - g).abs() < tolerance, "{g}");
+            assert!((mean(phase, |_| 1.0) - 1.0).abs() < 1e-9, "{g}: {}", mean(phase, |_| 1.0));
+            assert!((mean(phase, |c| c) - g).abs() < 1e-9, "{g}");
         }
     }
 
