@@ -63,7 +63,7 @@ fn exit_at(x: Vec3) -> Exit {
 
 /// The mean of `eval_at_depth` over its own law by quadrature: midpoints of t = e^y.
 fn mean_over_depths(model: &PhotonBeamDiffusion, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
-    let (first, last, steps) = (-16.0_f64, 6.0, 6000);
+    let (first, last, steps) = (-16.0_f64, 6.0, 24_000);
     let step = (last - first) / f64::from(steps);
     let mut sum = [0.0; 3];
     for i in 0..steps {

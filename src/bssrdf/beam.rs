@@ -123,6 +123,11 @@ impl BeamChannel {
         }
     }
 
+    /// S_d [1/(unit² sr)], arguments as for [`Self::exitance`].
+    pub fn s_d(&self, x: DVec3, n_i: DVec3, w: DVec3) -> f64 {
+        self.radiance * self.exitance(x, n_i, w)
+    }
+
     /// M [1/unit²] per entered flux, from x = x_o - x_i [unit], the outward normal of the entry and the refracted
     /// direction inside.
     pub fn exitance(&self, x: DVec3, n_i: DVec3, w: DVec3) -> f64 {
@@ -151,9 +156,9 @@ impl BeamChannel {
     /// M e^{gain} by Gauss-Legendre quadrature; `gain` is at most min(s, 1) r.
     ///
     /// With t = x·w + ρ sinh v the distance is d_r = ρ cosh v, the exponent E = t + s d_r is entire in v, and the
-    /// nearest poles are at Im v = π/2 whatever the scale of ρ: 32 nodes a panel, so that the error is below 1e-7
-    /// for r from 1e-4 to 1e4 mean free paths (32 nodes at normal incidence, up to 160). E is convex; the range is where
-    /// it lies within [`RANGE`] of its least value, the roots of a quadratic.
+    /// nearest poles are at Im v = π/2 whatever the scale of ρ: with 32 nodes a panel the error is below 1e-7 for r
+    /// from 1e-4 to 1e4 mean free paths. One panel at normal incidence, two for most oblique rays, at most nine. E is
+    /// convex; the range is where it lies within [`RANGE`] of its least value, the roots of a quadratic.
     fn integral(&self, pair: &Pair, gain: f64) -> f64 {
         if self.exitance_scale == 0.0 {
             return 0.0;
@@ -166,43 +171,42 @@ impl BeamChannel {
             return 0.0;
         }
         let (from, to) = self.range(near, rho, least + RANGE, least_at);
-        let along = |v: f64| {
-            let (e, e_inverse) = (v.exp(), (-v).exp());
-            let depth = (near + 0.5 * rho * (e - e_inverse)).max(0.0);
-            let distance = 0.5 * rho * (e + e_inverse);
+        let value = |depth: f64, distance: f64| {
             let z_r = depth * pair.mu;
             let d_r = distance.max(z_r);
-            (least - depth - s * d_r).exp() * self.dipole(d_r, z_r, depth) * distance
+            (least - depth - s * d_r).exp() * self.dipole(d_r, z_r, depth)
         };
-        let v_of = |t: f64| ((t - near) / rho).asinh();
-        let (first, last) = (v_of(from), v_of(to));
-        let mut sum = 0.0;
-        let mut start = first;
-        for split in self.splits(near, rho, pair.mu).map(v_of) {
-            if split > start + 0.25 && split < last - 0.25 {
-                sum += integrate(&*RULE, start, split, along);
-                start = split;
+        // The integral over depths from `a` to `b`, in panels that end where a ray that runs past the exit has a
+        // narrow peak, and before it, since the start of the ray has the scale of its own depth.
+        let in_v = |a: f64, b: f64| {
+            let v_of = |t: f64| ((t - near) / rho).asinh();
+            let along = |v: f64| {
+                let (e, e_inverse) = (v.exp(), (-v).exp());
+                let distance = 0.5 * rho * (e + e_inverse);
+                value((near + 0.5 * rho * (e - e_inverse)).max(0.0), distance) * distance
+            };
+            let last = v_of(b);
+            let mut start = v_of(a);
+            let mut sum = 0.0;
+            for (share, closeness) in [(0.5, 0.25), (0.875, 0.06), (1.0, f64::INFINITY)] {
+                let end = v_of(share * near);
+                if rho < closeness * near && end > start + 0.5 && end < last {
+                    sum += integrate(&*RULE, start, end, along);
+                    start = end;
+                }
             }
-        }
-        sum += integrate(&*RULE, start, last, along);
+            sum + if last > start { integrate(&*RULE, start, last, along) } else { 0.0 }
+        };
+        let sum = match floor(near, rho, pair.mu) {
+            None => in_v(from, to),
+            Some((begin, end)) => {
+                // Between, the distance is μ t and the integrand smooth in t; it falls as exp(-(1 + s μ) t).
+                let (begin, end) = (begin.clamp(from, to), end.clamp(from, to));
+                let seen = end.min(begin + RANGE / (1.0 + s * pair.mu));
+                in_v(from, begin) + integrate(&*RULE, begin, seen, |t| value(t, 0.0)) + in_v(end, to)
+            }
+        };
         self.exitance_scale * sum * (gain - least).exp()
-    }
-
-    /// Where a panel ends, in increasing order: at the nearest point, where a ray that runs past the exit has a
-    /// narrow peak; half way there, since the start has the scale of its own depth; and where the floor d_r ≥ z_r
-    /// begins and ends to bind, which needs an exit below the entry's tangent plane.
-    fn splits(&self, near: f64, rho: f64, mu: f64) -> [f64; 4] {
-        let half = if rho < 0.25 * near { 0.5 * near } else { near };
-        // ρ² + (t - near)² = μ² t²
-        let (a, r2) = ((1.0 - mu) * (1.0 + mu), near * near + rho * rho);
-        let bound = near * near - a * r2;
-        let mut splits = [half, near, near, near];
-        if bound > 1e-9 * r2 && near > 0.0 {
-            splits[2] = r2 / (near + bound.sqrt());
-            splits[3] = r2 / (near - bound.sqrt()).max(1e-300);
-        }
-        splits.sort_by(f64::total_cmp);
-        splits
     }
 
     /// The part of t ≥ 0 where t + s √((t - near)² + ρ²) is at most `most`, about its least point.
@@ -227,7 +231,7 @@ impl BeamChannel {
     }
 
     /// Exitance over the plane at normal incidence, per entered flux.
-    fn total(&self) -> f64 {
+    pub fn total(&self) -> f64 {
         if self.exitance_scale == 0.0 {
             return 0.0;
         }
@@ -256,6 +260,18 @@ impl BeamChannel {
         let d_r = (from_nearest * from_nearest + rho * rho).sqrt().max(z_r).max(LEAST_DISTANCE);
         self.exitance_scale * self.radiance * self.dipole(d_r, z_r, t * length) * (gain - self.s * d_r).exp()
     }
+}
+
+/// The depths between which the floor d_r ≥ z_r binds: ρ² + (t - near)² = μ² t². None on the plane, nor for any exit
+/// that is not below the entry's tangent plane.
+fn floor(near: f64, rho: f64, mu: f64) -> Option<(f64, f64)> {
+    let (a, r2) = ((1.0 - mu) * (1.0 + mu), near * near + rho * rho);
+    let bound = near * near - a * r2;
+    // On the plane `bound` is 0 but for rounding, where the exit lies straight ahead.
+    (near > 0.0 && bound > 1e-9 * r2).then(|| {
+        let root = bound.sqrt();
+        (r2 / (near + root), if near > root { r2 / (near - root) } else { f64::INFINITY })
+    })
 }
 
 impl PhotonBeamDiffusion {
@@ -304,7 +320,7 @@ impl PhotonBeamDiffusion {
 }
 
 impl Bssrdf for PhotonBeamDiffusion {
-    /// The whole integral over depth, by quadrature: 32 dipoles a channel at normal incidence, up to 160.
+    /// The whole integral over depth, by quadrature: 32 dipoles a channel at normal incidence, more off the plane.
     fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
         let pair = Pair::of(entry, exit);
         let gain = f64::from(rate) * pair.r;

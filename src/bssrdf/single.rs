@@ -70,7 +70,13 @@ impl SingleChannel {
         // (μ² - μ_c²) t² + 2 μ_c² (x·w) t - μ_c² r² = 0
         let start = if critical > 0.0 {
             let steep = ((mu_in - critical) * (mu_in + critical)).max(0.0);
-            critical * r2 / (critical * near + (critical * critical * near * near + steep * r2).sqrt())
+            let root = (critical * critical * near * near + steep * r2).sqrt();
+            // The form without cancellation for either sign of x·w; infinite where no depth is steep enough.
+            if near > 0.0 {
+                critical * r2 / (critical * near + root)
+            } else {
+                critical * (root - critical * near) / steep
+            }
         } else {
             0.0
         };

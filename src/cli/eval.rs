@@ -7,13 +7,15 @@ use std::io::{self, BufRead, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Reads a CSV on standard input and writes it with S_d [1/(unit² sr)] appended.
-///
-/// The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (plane, normal incidence; M(r)
-/// per entered flux is appended too, as `exitance`) or x,y,z (exit minus entry), nix,niy,niz, nox,noy,noz (unit
-/// normals), wx,wy,wz (refracted direction inside). Model `slab` also needs `thickness` and takes `eta_far`. Other columns
-/// pass through. Results come last, so that they win where a column of the input has the same name.
+/// Options.
 #[derive(clap::Args)]
+#[command(after_help = "\
+The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (a plane, normal incidence) or \
+x,y,z (exit minus entry), nix,niy,niz and nox,noy,noz (outward unit normals), wx,wy,wz (refracted direction inside). \
+`slab` also needs `thickness` and takes `eta_far`. Any unit of length. Other columns, empty lines and lines that \
+begin with # pass through.\n\n\
+Appended: S_d [1/(unit² sr)]; with r also `exitance` M(r) [1/unit²] per entered flux. Results come last, so that they \
+win where the input has a column of the same name. Exit code 2: bad header or option; 3: bad row, with its line.")]
 pub struct Args {
     /// BSSRDF model
     #[arg(long, value_name = "NAME")]

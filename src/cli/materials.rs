@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::process::ExitCode;
 
-/// The catalogue of measured media: source, index, reduced albedo, lengths, reflectance, and the models to trust.
+/// Options.
 #[derive(clap::Args)]
 pub struct Args {
     /// Only this material, with its coefficients and where they come from

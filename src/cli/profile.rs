@@ -1,7 +1,7 @@
 //! `marmor profile`.
 
 use clap::builder::NonEmptyStringValueParser;
-use marmor::bssrdf::{Bssrdf, Model, ModelName, ModelVisitor};
+use marmor::bssrdf::{Bssrdf, DirectionalDipole, Model, ModelName, ModelVisitor};
 use marmor::math::Rgb;
 use marmor::optics::{self, Measured, Medium};
 use marmor::report::Profile;
@@ -10,10 +10,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Exitance M(r) of a half space around a normal pencil beam, per entered flux, by one or more models.
-///
-/// For materials of the catalogue the Monte Carlo truth is shown beside the models where the project has it.
+/// Options.
 #[derive(clap::Args)]
+#[command(after_help = "\
+Exitance M(r) of a half space around a normal pencil beam, per entered flux. Models that leave out light scattered \
+once get exact single scattering added. For materials of the catalogue the Monte Carlo truth is shown beside the \
+models where the project has it, with the ratio of the fluxes through the same rings below.")]
 pub struct Args {
     /// A material of the catalogue (`marmor materials` lists them)
     #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(),
@@ -37,6 +39,9 @@ pub struct Args {
     /// Models, separated by commas; all that fit a half space by default
     #[arg(long, value_name = "A,B", value_delimiter = ',')]
     model: Vec<ModelName>,
+    /// `directional` scaled to the true albedo of the half space, not as published
+    #[arg(long)]
+    calibrated: bool,
     /// First radius, last radius and their number, spaced in equal ratios
     #[arg(long, value_name = "A:B:N", value_parser = radii)]
     r: Option<Radii>,
@@ -56,7 +61,13 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let mut profile = Profile::new(medium, args.unit_of_r, row, args.r.map(|r| r.0));
     let models = if args.model.is_empty() { half_space_models() } else { args.model };
     for name in models {
-        Model::new(name, &medium, true).visit(Add { profile: &mut profile, name });
+        if name == ModelName::Directional && args.calibrated {
+            profile.add("directional, calibrated", &DirectionalDipole::new(&medium, true));
+        } else {
+            let model = Model::with_thickness(name, &medium, None, true).map_err(|e| Error::usage(e.to_string()))?;
+            let name = model.name().name();
+            model.visit(Add { profile: &mut profile, name });
+        }
     }
     match args.output.as_deref() {
         None => {
@@ -88,13 +99,13 @@ fn half_space_models() -> Vec<ModelName> {
 
 struct Add<'a> {
     profile: &'a mut Profile,
-    name: ModelName,
+    name: &'static str,
 }
 
 impl ModelVisitor for Add<'_> {
     type Out = ();
     fn visit<B: Bssrdf>(self, model: &B) {
-        self.profile.add(self.name.name(), model);
+        self.profile.add(self.name, model);
     }
 }
 

@@ -70,7 +70,7 @@ pub enum Trust {
     Diffusion,
     /// α′ ≥ 0.6, g ≤ 0.8: models to which exact single scattering is added.
     WithSingleScattering,
-    /// α′ in 0.5 .. 0.6 or g > 0.8: `beam` with single scattering, with errors of 10 to 25 %.
+    /// α′ in 0.5 .. 0.6 or g > 0.8: `beam` with single scattering, with errors of 8 to 15 %.
     Marginal,
     /// α′ < 0.5, or g > 0.9 with α < 0.99: trace paths.
     PathTracing,
