@@ -40,8 +40,8 @@ fn channel(albedo: f64, g: f64, eta: f64) -> ChannelMedium {
     ChannelMedium { sigma_s: albedo, sigma_a: 1.0 - albedo, g, eta }
 }
 
-fn grey(albedo: f32, g: f32, eta: f32) -> Medium {
-    Medium { sigma_s: Rgb::splat(albedo), sigma_a: Rgb::splat(1.0 - albedo), g: g.into(), eta }
+fn grey(albedo: f32, g: f64, eta: f32) -> Medium {
+    Medium { sigma_s: Rgb::splat(albedo), sigma_a: Rgb::splat(1.0 - albedo), g, eta }
 }
 
 #[test]
