@@ -6,6 +6,7 @@ mod beam;
 mod channel;
 mod depth;
 mod directional;
+mod exponential;
 mod quadrature;
 mod single;
 mod standard;
