@@ -2,6 +2,7 @@
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::depth::DepthLaw;
+use super::exponential::{exp, exp_m1};
 use super::quadrature::{gauss_legendre, integrate};
 use super::{Bssrdf, Entry, Exit};
 use crate::math::{DVec3, Rgb};
@@ -98,6 +99,31 @@ impl Pair {
     }
 }
 
+/// A [`Pair`] in mean free paths of one channel.
+struct Ray {
+    /// x·w.
+    near: f64,
+    rho: f64,
+    mu: f64,
+    /// Least value of the exponent E over all depths.
+    least: f64,
+}
+
+impl Ray {
+    /// The depths between which the floor d_r ≥ z_r binds: ρ² + (t - near)² = μ² t². None on the plane, nor for any
+    /// exit that is not below the entry's tangent plane.
+    fn floor(&self) -> Option<(f64, f64)> {
+        let (near, rho, mu) = (self.near, self.rho, self.mu);
+        let (a, r2) = ((1.0 - mu) * (1.0 + mu), near * near + rho * rho);
+        let bound = near * near - a * r2;
+        // On the plane `bound` is 0 but for rounding, where the exit lies straight ahead.
+        (near > 0.0 && bound > 1e-9 * r2).then(|| {
+            let root = bound.sqrt();
+            (r2 / (near + root), if near > root { r2 / (near - root) } else { f64::INFINITY })
+        })
+    }
+}
+
 impl BeamChannel {
     /// One channel. `exit_normalisation`: see [`super::Model::new`].
     pub fn new(medium: &ChannelMedium, exit_normalisation: bool, kappa: KappaExtinction) -> Self {
@@ -144,12 +170,12 @@ impl BeamChannel {
         let apart = h * (z_r + z_v);
         let d_v = (d_r * d_r + apart).sqrt();
         let t = apart / (d_r + d_v);
-        let m = (-s * t).exp_m1();
+        let m = exp_m1(-s * t);
         let (over_r, over_v) = (1.0 / d_r, 1.0 / d_v);
         let difference = (t * over_r - m) * over_v;
         let real = z_r * over_r * over_r * over_r * (1.0 + s * d_r);
         let image = z_v * over_v * over_v * over_v * (1.0 + s * d_v) * (1.0 + m);
-        let kappa = -(-self.kappa * (d_r + depth)).exp_m1();
+        let kappa = -exp_m1(-self.kappa * (d_r + depth));
         kappa * (self.c_phi_over_d * difference + self.c_e * (real + image))
     }
 
@@ -170,43 +196,50 @@ impl BeamChannel {
         if gain - least < -700.0 {
             return 0.0;
         }
+        let ray = Ray { near, rho, mu: pair.mu, least };
         let (from, to) = self.range(near, rho, least + RANGE, least_at);
-        let value = |depth: f64, distance: f64| {
-            let z_r = depth * pair.mu;
-            let d_r = distance.max(z_r);
-            (least - depth - s * d_r).exp() * self.dipole(d_r, z_r, depth)
-        };
-        // The integral over depths from `a` to `b`, in panels that end where a ray that runs past the exit has a
-        // narrow peak, and before it, since the start of the ray has the scale of its own depth.
-        let in_v = |a: f64, b: f64| {
-            let v_of = |t: f64| ((t - near) / rho).asinh();
-            let along = |v: f64| {
-                let (e, e_inverse) = (v.exp(), (-v).exp());
-                let distance = 0.5 * rho * (e + e_inverse);
-                value((near + 0.5 * rho * (e - e_inverse)).max(0.0), distance) * distance
-            };
-            let last = v_of(b);
-            let mut start = v_of(a);
-            let mut sum = 0.0;
-            for (share, closeness) in [(0.5, 0.25), (0.875, 0.06), (1.0, f64::INFINITY)] {
-                let end = v_of(share * near);
-                if rho < closeness * near && end > start + 0.5 && end < last {
-                    sum += integrate(&*RULE, start, end, along);
-                    start = end;
-                }
-            }
-            sum + if last > start { integrate(&*RULE, start, last, along) } else { 0.0 }
-        };
-        let sum = match floor(near, rho, pair.mu) {
-            None => in_v(from, to),
+        let sum = match ray.floor() {
+            None => self.panels(&ray, from, to),
             Some((begin, end)) => {
                 // Between, the distance is μ t and the integrand smooth in t; it falls as exp(-(1 + s μ) t).
                 let (begin, end) = (begin.clamp(from, to), end.clamp(from, to));
-                let seen = end.min(begin + RANGE / (1.0 + s * pair.mu));
-                in_v(from, begin) + integrate(&*RULE, begin, seen, |t| value(t, 0.0)) + in_v(end, to)
+                let seen = end.min(begin + RANGE / (1.0 + s * ray.mu));
+                let between = integrate(&*RULE, begin, seen, |t| self.along(&ray, t, 0.0));
+                self.panels(&ray, from, begin) + between + self.panels(&ray, end, to)
             }
         };
-        self.exitance_scale * sum * (gain - least).exp()
+        self.exitance_scale * sum * exp(gain - least)
+    }
+
+    /// exp(least - E) κ dip 4π at `depth`, where the exit is at `distance`.
+    fn along(&self, ray: &Ray, depth: f64, distance: f64) -> f64 {
+        let z_r = depth * ray.mu;
+        let d_r = distance.max(z_r);
+        exp(ray.least - depth - self.s * d_r) * self.dipole(d_r, z_r, depth)
+    }
+
+    /// The integral over depths from `a` to `b` in v. Panels end at the nearest point, where a ray that runs past the
+    /// exit has a narrow peak, and twice before it, since the start of the ray has the scale of its own depth.
+    fn panels(&self, ray: &Ray, a: f64, b: f64) -> f64 {
+        let (near, rho) = (ray.near, ray.rho);
+        let v_of = |t: f64| ((t - near) / rho).asinh();
+        let along = |v: f64| {
+            let e = exp(v);
+            let e_inverse = 1.0 / e;
+            let distance = 0.5 * rho * (e + e_inverse);
+            self.along(ray, (near + 0.5 * rho * (e - e_inverse)).max(0.0), distance) * distance
+        };
+        let last = v_of(b);
+        let mut start = v_of(a);
+        let mut sum = 0.0;
+        for (share, closeness) in [(0.5, 0.25), (0.875, 0.06), (1.0, f64::INFINITY)] {
+            let end = v_of(share * near);
+            if rho < closeness * near && end > start + 0.5 && end < last {
+                sum += integrate(&*RULE, start, end, along);
+                start = end;
+            }
+        }
+        sum + if last > start { integrate(&*RULE, start, last, along) } else { 0.0 }
     }
 
     /// The part of t ≥ 0 where t + s √((t - near)² + ρ²) is at most `most`, about its least point.
@@ -258,20 +291,8 @@ impl BeamChannel {
         let (from_nearest, rho) = ((t - pair.x_w) * length, pair.rho * length);
         let z_r = t * pair.mu * length;
         let d_r = (from_nearest * from_nearest + rho * rho).sqrt().max(z_r).max(LEAST_DISTANCE);
-        self.exitance_scale * self.radiance * self.dipole(d_r, z_r, t * length) * (gain - self.s * d_r).exp()
+        self.exitance_scale * self.radiance * self.dipole(d_r, z_r, t * length) * exp(gain - self.s * d_r)
     }
-}
-
-/// The depths between which the floor d_r ≥ z_r binds: ρ² + (t - near)² = μ² t². None on the plane, nor for any exit
-/// that is not below the entry's tangent plane.
-fn floor(near: f64, rho: f64, mu: f64) -> Option<(f64, f64)> {
-    let (a, r2) = ((1.0 - mu) * (1.0 + mu), near * near + rho * rho);
-    let bound = near * near - a * r2;
-    // On the plane `bound` is 0 but for rounding, where the exit lies straight ahead.
-    (near > 0.0 && bound > 1e-9 * r2).then(|| {
-        let root = bound.sqrt();
-        (r2 / (near + root), if near > root { r2 / (near - root) } else { f64::INFINITY })
-    })
 }
 
 impl PhotonBeamDiffusion {

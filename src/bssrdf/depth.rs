@@ -1,5 +1,7 @@
 //! Depths along a refracted ray, one for three channels.
 
+use super::exponential::exp;
+
 /// The mean of the exponential densities of the channels, p(t) = mean over c of σ_c exp(-σ_c t): with the balance
 /// heuristic no channel's weight exceeds their number. A mean free path averaged over channels would have weights
 /// without bound.
@@ -23,7 +25,7 @@ impl DepthLaw {
 
     /// exp(-(σ_c - least) t) per channel, 0 where it takes no part.
     fn relative(&self, t: f64) -> [f64; 3] {
-        self.sigma.map(|s| if s > 0.0 { (-(s - self.least) * t).exp() } else { 0.0 })
+        self.sigma.map(|s| if s > 0.0 { exp(-(s - self.least) * t) } else { 0.0 })
     }
 
     /// The depth [unit] with cumulative probability `u` in [0, 1); 0 if no channel takes part. Monotone, so that

@@ -1,6 +1,7 @@
 //! The directional dipole.
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
+use super::exponential::{exp, exp_m1};
 use super::quadrature::{gauss_legendre, integrate};
 use super::true_albedo::half_space_albedo;
 use super::{Bssrdf, Claims, Entry, Exit};
@@ -35,8 +36,8 @@ const LEAST_ALBEDO: f64 = 1e-6;
 /// * Always has the exit factor 1/(4 C_phi(1/η)), as published.
 ///
 /// Computed in f64 from f32 inputs, in units of the transport mean free path, in a form without cancellation: real
-/// and virtual source are subtracted before the common exponential. It costs little more than f32, because the
-/// dot products are shared by the channels, and it leaves no row of input whose value rounding decides.
+/// and virtual source are subtracted before the common exponential. The dot products, which the channels share, need
+/// f64 where x is nearly parallel to n_i; the rest has it so that no power of a length leaves the range.
 pub struct DirectionalDipole {
     channels: [DirectionalChannel; 3],
     totals: [f64; 3],
@@ -170,7 +171,7 @@ impl DirectionalChannel {
             return 0.0;
         }
         let t = (h * h - beyond) / (d_v + d_r);
-        let m = (-s * t).exp_m1();
+        let m = exp_m1(-s * t);
         let q = 1.0 + m;
         let (u, v, over) = (t / d_r, d_v / d_r, 1.0 / d_v);
         let v2 = v * v;
@@ -190,7 +191,7 @@ impl DirectionalChannel {
         let sum = 3.0 * c_phi * first
             + (p * third - p_more * q * k_v * over3)
             + (o * fifth - o_more * q * j_v * over3 * over * over);
-        self.scale * sum * exponent.exp()
+        self.scale * sum * exp(exponent)
     }
 
     /// Exitance over the plane, normal incidence, per entered flux, of the clamped model.

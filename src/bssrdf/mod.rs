@@ -8,6 +8,7 @@ mod better;
 mod channel;
 mod depth;
 mod directional;
+mod exponential;
 mod multipole;
 mod normalised;
 mod quadrature;
