@@ -10,12 +10,14 @@ use std::process::ExitCode;
 /// Options.
 #[derive(clap::Args)]
 #[command(after_help = "\
-The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (a plane, normal incidence) or \
-x,y,z (exit minus entry), nix,niy,niz and nox,noy,noz (outward unit normals), wx,wy,wz (refracted direction inside). \
-`slab` also needs `thickness` and takes `eta_far`. Any unit of length. Other columns, empty lines and lines that \
-begin with # pass through.\n\n\
-Appended: S_d [1/(unit² sr)]; with r also `exitance` M(r) [1/unit²] per entered flux. Results come last, so that they \
-win where the input has a column of the same name. Exit code 2: bad header or option; 3: bad row, with its line.")]
+The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (a plane, normal
+incidence) or x,y,z (exit minus entry), nix,niy,niz and nox,noy,noz (outward unit normals), wx,wy,wz
+(refracted direction inside). `slab` also needs `thickness` and takes `eta_far`. Any unit of length.
+Other columns, empty lines and lines that begin with # pass through.
+
+Appended: S_d [1/(unit² sr)]; with r also `exitance`, M(r) [1/unit²] per entered flux. Results come
+last, so that they win where the input has a column of the same name.
+Exit code 2: bad header or option; 3: bad row, with its line.")]
 pub struct Args {
     /// BSSRDF model
     #[arg(long, value_name = "NAME")]

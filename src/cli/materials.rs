@@ -62,7 +62,7 @@ fn table(rows: &[&Measured]) -> String {
             row.name,
             row.source,
             row.eta,
-            three(&|k| k.alpha_prime),
+            optics.map(|k| albedo(&k)).join(" "),
             three(&|k| k.transport_mean_free_path),
             three(&|k| k.diffusion_length),
             r,
@@ -167,6 +167,15 @@ fn to_json(row: &Measured) -> Value {
         "trusted_models": row.trust().models(),
         "provenance": row.provenance,
     })
+}
+
+/// Six columns; what four decimals would round to 1 is shown by what is missing.
+fn albedo(k: &ChannelOptics) -> String {
+    match k.absorbed_prime {
+        0.0 => format!("{:>6}", 1),
+        missing if missing < 5e-5 => format!("1-{missing:.0e}"),
+        _ => short(k.alpha_prime),
+    }
 }
 
 /// Six columns: three or four significant digits.

@@ -13,9 +13,9 @@ use std::process::ExitCode;
 /// Options.
 #[derive(clap::Args)]
 #[command(after_help = "\
-Exitance M(r) of a half space around a normal pencil beam, per entered flux. Models that leave out light scattered \
-once get exact single scattering added. For materials of the catalogue the Monte Carlo truth is shown beside the \
-models where the project has it, with the ratio of the fluxes through the same rings below.")]
+Exitance M(r) of a half space around a normal pencil beam, per entered flux. Models that leave out light
+scattered once get exact single scattering added. For materials of the catalogue the Monte Carlo truth is
+shown beside the models where the project has it, with the ratio of the fluxes through the same rings below.")]
 pub struct Args {
     /// A material of the catalogue (`marmor materials` lists them)
     #[arg(long, value_name = "NAME", value_parser = NonEmptyStringValueParser::new(),
