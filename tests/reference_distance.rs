@@ -1,6 +1,6 @@
 //! Boundaries, constants and distance-only models against high-precision tables: tests/data/README.md says where the
 //! rows come from. With `MARMOR_REFERENCE_DIR` set, against the whole tables.
-#![allow(clippy::unwrap_used)] // a table that cannot be read is a failed test
+#![allow(clippy::unwrap_used, clippy::print_stdout)] // a table that cannot be read is a failed test; scores are shown
 
 mod support;
 

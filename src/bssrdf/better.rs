@@ -2,10 +2,10 @@
 
 use super::Claims;
 use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths, left};
-use super::standard::length;
-use crate::math::{Rgb, exp_m1, times_exp};
+use super::standard::length_log2;
+use crate::math::{Rgb, exp2_m1, times_exp2};
 use crate::optics::{FresnelMoments, Medium, better_total};
-use std::f64::consts::PI;
+use std::f64::consts::{LOG2_E, PI};
 
 /// The better dipole [dEo12]: Grosjean's diffusion coefficient, the boundary with both Fresnel moments, and an exitance
 /// of fluence and flux. With lengths in l′ = 1/σ_t′, D = (2 - α′)/3, s = sqrt((1 - α′)/D), z_v = 1 + 4 A D and
@@ -28,10 +28,12 @@ pub struct BetterDipole {
 pub struct Pair {
     /// σ_t′² [1/unit²].
     sigma_squared: f32,
-    /// 1 / σ_t′ [unit].
-    length: f32,
+    /// log2 e / σ_t′ [unit]: of a rate, what it takes off `decay_log2`.
+    length_log2: f32,
     /// s.
     decay: f32,
+    /// s log2 e.
+    decay_log2: f32,
     /// z_v.
     z_virtual: f32,
     /// z_v² - 1.
@@ -57,8 +59,9 @@ impl BetterDipole {
             decay = decay.min(s * k.sigma_t_prime);
             Pair {
                 sigma_squared: finite(k.sigma_t_prime * k.sigma_t_prime),
-                length: length(&k),
+                length_log2: length_log2(&k),
                 decay: s as f32,
+                decay_log2: (LOG2_E * s) as f32,
                 z_virtual: z_virtual as f32,
                 lift: ((z_virtual - 1.0) * (z_virtual + 1.0)) as f32,
                 fluence: (moments.c_phi / diffusion) as f32,
@@ -84,18 +87,19 @@ impl Pair {
         let s = self.decay;
         let x2 = in_mean_free_paths(r2, self.sigma_squared);
         let (d_r, d_v) = ((x2 + 1.0).sqrt(), (x2 + self.z_virtual * self.z_virtual).sqrt());
+        // One division for 1/d_r, 1/d_v and d_v - d_r = (z_v² - 1) / (d_v + d_r), which does not cancel.
         let (sum, product) = (d_r + d_v, d_r * d_v);
         let over = 1.0 / (sum * product);
         let (i_r, i_v, t) = (over * (d_v * sum), over * (d_r * sum), self.lift * (over * product));
-        let mut exponent = s * d_r;
+        let mut exponent = self.decay_log2 * d_r;
         if COMPENSATED {
-            let rate = rate * self.length;
-            exponent = left(s, rate) * d_r + rate / (d_r + x2.sqrt());
+            let rate = rate * self.length_log2;
+            exponent = left(self.decay_log2, rate) * d_r + rate / (d_r + x2.sqrt());
         }
-        let m = exp_m1(-s * t);
+        let m = exp2_m1(-self.decay_log2 * t);
         let fluence = (t * i_r - m) * i_v;
         let flux = (i_r + s) * (i_r * i_r) + self.z_virtual * (1.0 + m) * ((i_v + s) * (i_v * i_v));
-        times_exp(self.scale * (self.fluence * fluence + self.flux * flux), -exponent)
+        times_exp2(self.scale * (self.fluence * fluence + self.flux * flux), -exponent)
     }
 }
 

@@ -3,9 +3,9 @@
 use super::Claims;
 use super::radial::{Channel, Channels, DistanceOnly, finite, left};
 use crate::error::{Error, Result};
-use crate::math::{Rgb, exp};
+use crate::math::{Rgb, exp2};
 use crate::optics::{FresnelMoments, Medium, standard_total};
-use std::f64::consts::PI;
+use std::f64::consts::{LOG2_E, PI};
 
 /// Which of the three published fits gives the width d = l / s(A).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,8 +51,8 @@ const CORE: f32 = 1e-9;
 /// One channel.
 #[derive(Clone, Copy, Debug)]
 pub struct Width {
-    /// 1 / 3d [1/unit].
-    decay: f32,
+    /// log2 e / 3d [1/unit].
+    decay_log2: f32,
     /// [`CORE`] d [unit].
     core: f32,
     /// A / 8π d, over π and the exit normalisation [1/(unit sr)].
@@ -102,19 +102,19 @@ impl NormalisedDiffusion {
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
         let each = channels.map(|(albedo, d)| {
             if !d.is_finite() {
-                return Width { decay: 0.0, core: 1.0, scale: 0.0 };
+                return Width { decay_log2: 0.0, core: 1.0, scale: 0.0 };
             }
             let scale = finite(albedo / (8.0 * PI * PI * exit * d));
             // Neither 0 nor so small that the value at the core leaves f32.
             let core = (d as f32 * CORE).max(f32::MIN_POSITIVE).max(scale * 1e-37);
-            Width { decay: finite(1.0 / (3.0 * d)), core, scale }
+            Width { decay_log2: finite(LOG2_E / (3.0 * d)), core, scale }
         });
         let [r, g, b] = channels;
         Self {
             channels: Channels {
                 each,
                 grey: r == g && g == b,
-                decay: each.iter().map(|k| k.decay).fold(f32::INFINITY, f32::min),
+                decay: channels.iter().map(|(_, d)| finite(1.0 / (3.0 * d))).fold(f32::INFINITY, f32::min),
                 total: Rgb(channels.map(|(albedo, _)| albedo as f32)),
                 exitance: (PI * exit) as f32,
             },
@@ -166,7 +166,7 @@ impl Channel for Width {
     fn value(self, r2: f32) -> f32 {
         let r = self.outside_core(r2);
         // exp(-r/6d): its square may leave the range of f32 where the product with the scale does not.
-        let root = exp(-(0.5 * self.decay * r));
+        let root = exp2(-(0.5 * self.decay_log2 * r));
         let y = root * root;
         self.scale / r * (1.0 + y * y) * root * root
     }
@@ -174,10 +174,10 @@ impl Channel for Width {
     #[inline(always)]
     fn compensated(self, r2: f32, rate: f32) -> f32 {
         let r = self.outside_core(r2);
-        let root = exp(-(0.5 * self.decay * r));
+        let root = exp2(-(0.5 * self.decay_log2 * r));
         let y = root * root;
         // exp(rate r) (y + y³) with the gain in the exponent.
-        let gained = exp(-(0.5 * left(self.decay, rate) * r));
+        let gained = exp2(-(0.5 * left(self.decay_log2, rate * std::f32::consts::LOG2_E) * r));
         self.scale / r * (1.0 + y * y) * gained * gained
     }
 }

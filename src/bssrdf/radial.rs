@@ -58,6 +58,16 @@ pub trait Channel: Copy + Send + Sync {
 
     /// S_d exp(rate r), formed in the exponent; `rate` [1/unit] is at most the channel's decay.
     fn compensated(self, r2: f32, rate: f32) -> f32;
+
+    /// [`Self::value`] of a block; the same bits. For formulas that vectorise in parts only.
+    #[inline(always)]
+    fn values(self, r2: &[f32; BLOCK]) -> [f32; BLOCK] {
+        let mut out = [0.0; BLOCK];
+        for (out, &r2) in out.iter_mut().zip(r2) {
+            *out = self.value(r2);
+        }
+        out
+    }
 }
 
 /// The constants of a distance-only model.
@@ -163,14 +173,23 @@ impl<C: Channel> Kernel for Batch<'_, C> {
 
     #[inline(always)]
     fn run(self) {
-        for (out, &r) in self.out.iter_mut().zip(self.r) {
-            *out = self.channel.value(r * r) * self.exitance;
+        let count = self.r.len().min(self.out.len());
+        let (r, out) = (&self.r[..count], &mut self.out[..count]);
+        for (r, out) in r.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            let mut r2 = [1.0; BLOCK];
+            for (r2, r) in r2.iter_mut().zip(r) {
+                *r2 = r * r;
+            }
+            let values = self.channel.values(&r2);
+            for (out, value) in out.iter_mut().zip(&values) {
+                *out = value * self.exitance;
+            }
         }
     }
 }
 
 /// Entries handled between two visits to memory; a multiple of the lanes of the sum.
-const BLOCK: usize = 64;
+pub(super) const BLOCK: usize = 64;
 /// Lanes of the sum, whatever the instruction set.
 const LANES: usize = 16;
 
@@ -194,14 +213,11 @@ impl<C: Channel> Kernel for Sum<'_, C> {
             let block = Columns::load(e, start, count, self.x);
             let r2 = block.distances(self.x);
             let mut s = [0.0_f32; BLOCK];
-            for c in 0..3 {
+            for (c, lanes) in lanes.iter_mut().enumerate() {
                 if c == 0 || !self.grey {
-                    let channel = self.channels[c];
-                    for (s, &r2) in s.iter_mut().zip(&r2) {
-                        *s = channel.value(r2);
-                    }
+                    s = self.channels[c].values(&r2);
                 }
-                add(&mut lanes[c], &s, &block.weight[c]);
+                add(lanes, &s, &block.weight[c]);
             }
             start += BLOCK;
         }
@@ -249,9 +265,9 @@ impl Columns {
     #[inline(always)]
     fn distances(&self, at: Vec3) -> [f32; BLOCK] {
         let mut r2 = [0.0; BLOCK];
-        for i in 0..BLOCK {
+        for (i, r2) in r2.iter_mut().enumerate() {
             let (x, y, z) = (self.x[i] - at.x, self.y[i] - at.y, self.z[i] - at.z);
-            r2[i] = x * x + y * y + z * z;
+            *r2 = x * x + y * y + z * z;
         }
         r2
     }

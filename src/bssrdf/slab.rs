@@ -1,13 +1,13 @@
 //! The multipole: a slab between two boundaries.
 
 use super::multipole::Multipole;
-use super::radial::{Batch, Channel, FARTHEST_SQUARED, Radial, finite, left};
-use super::standard::length;
+use super::radial::{BLOCK, Batch, Channel, Radial, finite, in_mean_free_paths, left};
+use super::standard::length_log2;
 use super::{Bssrdf, Claims, Entry, Exit};
 use crate::error::{Error, Result};
-use crate::math::{Level, Rgb, dispatch_at, times_exp};
+use crate::math::{Level, Rgb, dispatch_at, times_exp2};
 use crate::optics::{FresnelMoments, Medium};
-use std::f64::consts::PI;
+use std::f64::consts::{LOG2_E, PI};
 
 /// The multipole of a flat slab [DJ05]: the point source at depth l′ and its images in both extrapolated boundaries,
 /// without end. With lengths in l′ = 1/σ_t′, s = sqrt(3 (1 - α′)), z_b = 2/3 A at each face, period
@@ -49,12 +49,14 @@ const THICKEST: f64 = 3e7;
 pub struct Face {
     /// σ_t′² [1/unit²].
     sigma_squared: f32,
-    /// 1 / σ_t′ [unit].
-    length: f32,
+    /// log2 e / σ_t′ [unit]: of a rate, what it takes off `decay_log2`.
+    length_log2: f32,
     /// Square of the depth of the nearest pole.
     depth_squared: f32,
     /// Decay far out: that of the slab's slowest mode.
     decay: f32,
+    /// The same, times log2 e.
+    decay_log2: f32,
     /// α′ σ_t′² / 4π, over π and the exit normalisation [1/(unit² sr)].
     scale: f32,
     /// Upper bits of `depth_squared`: the first piece.
@@ -96,7 +98,7 @@ impl Slab {
             let scale = k.alpha_prime * k.sigma_t_prime * k.sigma_t_prime / (4.0 * PI * PI * exit[side]);
             Face {
                 sigma_squared: finite(k.sigma_t_prime * k.sigma_t_prime),
-                length: length(&k),
+                length_log2: length_log2(&k),
                 scale: finite(scale),
                 ..Face::tabulate(&sums[c], side == 1)
             }
@@ -180,29 +182,49 @@ impl Face {
             start = Some(ends[3]);
             *cubic = through_thirds(ends).map(|c| c as f32);
         }
-        Self { sigma_squared: 0.0, length: 0.0, scale: 0.0, depth_squared, decay: q as f32, first, cubics }
+        Self {
+            sigma_squared: 0.0,
+            length_log2: 0.0,
+            scale: 0.0,
+            depth_squared,
+            decay: q as f32,
+            decay_log2: (LOG2_E * q) as f32,
+            first,
+            cubics,
+        }
+    }
+
+    /// The first half: (piece of the table, place in it, distance to the nearest pole, exponent).
+    #[inline(always)]
+    fn locate<const COMPENSATED: bool>(&self, r2: f32, rate: f32) -> (u32, f32, f32, f32) {
+        const SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PIECES_LOG2;
+        const BELOW: u32 = (1 << SHIFT) - 1;
+        let x2 = in_mean_free_paths(r2, self.sigma_squared);
+        let d2 = x2 + self.depth_squared;
+        let d = d2.sqrt();
+        let mut exponent = self.decay_log2 * d;
+        if COMPENSATED {
+            let rate = rate * self.length_log2;
+            exponent = left(self.decay_log2, rate) * d + rate * self.depth_squared / (d + x2.sqrt());
+        }
+        let bits = d2.to_bits();
+        let t = (bits & BELOW) as i32 as f32 * (1.0 / (BELOW + 1) as f32);
+        // Beyond the table the exponential is 0, so that a piece taken round the end does not matter.
+        ((bits >> SHIFT).wrapping_sub(self.first) % PIECES as u32, t, d, exponent)
+    }
+
+    /// The second half.
+    #[inline(always)]
+    fn finish(&self, [a, b, c, e]: [f32; 4], t: f32, d: f32, exponent: f32) -> f32 {
+        let i = 1.0 / d;
+        let smooth = a + t * (b + t * (c + t * e));
+        times_exp2(self.scale * smooth * ((i + self.decay) * (i * i)), -exponent)
     }
 
     #[inline(always)]
     fn eval<const COMPENSATED: bool>(&self, r2: f32, rate: f32) -> f32 {
-        const SHIFT: u32 = f32::MANTISSA_DIGITS - 1 - PIECES_LOG2;
-        const BELOW: u32 = (1 << SHIFT) - 1;
-        let x2 = r2 * self.sigma_squared;
-        let x2 = if x2 < FARTHEST_SQUARED { x2 } else { FARTHEST_SQUARED };
-        let d2 = x2 + self.depth_squared;
-        let d = d2.sqrt();
-        let i = 1.0 / d;
-        let mut exponent = self.decay * d;
-        if COMPENSATED {
-            let rate = rate * self.length;
-            exponent = left(self.decay, rate) * d + rate * self.depth_squared / (d + x2.sqrt());
-        }
-        let bits = d2.to_bits();
-        // Beyond the table the exponential is 0, so that a piece taken round the end does not matter.
-        let piece = &self.cubics[((bits >> SHIFT).wrapping_sub(self.first) as usize) & (PIECES - 1)];
-        let t = (bits & BELOW) as i32 as f32 * (1.0 / (BELOW + 1) as f32);
-        let smooth = piece[0] + t * (piece[1] + t * (piece[2] + t * piece[3]));
-        times_exp(self.scale * smooth * ((i + self.decay) * (i * i)), -exponent)
+        let (piece, t, d, exponent) = self.locate::<COMPENSATED>(r2, rate);
+        self.finish(self.cubics[piece as usize], t, d, exponent)
     }
 }
 
@@ -226,6 +248,25 @@ impl Channel for &Face {
     fn compensated(self, r2: f32, rate: f32) -> f32 {
         self.eval::<true>(r2, rate)
     }
+
+    /// Vectorised but for the table, whose rows are fetched one by one between the halves.
+    #[inline(always)]
+    fn values(self, r2: &[f32; BLOCK]) -> [f32; BLOCK] {
+        let (mut piece, mut t, mut d, mut exponent) = ([0; BLOCK], [0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
+        for i in 0..BLOCK {
+            (piece[i], t[i], d[i], exponent[i]) = self.locate::<false>(r2[i], 0.0);
+        }
+        let mut cubic = [[0.0; BLOCK]; 4];
+        for i in 0..BLOCK {
+            let [a, b, c, e] = self.cubics[piece[i] as usize % PIECES];
+            (cubic[0][i], cubic[1][i], cubic[2][i], cubic[3][i]) = (a, b, c, e);
+        }
+        let mut out = [0.0; BLOCK];
+        for i in 0..BLOCK {
+            out[i] = self.finish([cubic[0][i], cubic[1][i], cubic[2][i], cubic[3][i]], t[i], d[i], exponent[i]);
+        }
+        out
+    }
 }
 
 impl Bssrdf for Slab {
@@ -239,11 +280,12 @@ impl Bssrdf for Slab {
             // The weight is of the straight distance: what it has more than r joins at the end.
             let straight = r2.sqrt();
             r2 = (x - across * height).length_squared();
-            rest = rate * (height * height) / (straight + r2.sqrt()).max(f32::MIN_POSITIVE);
+            let more = height * height / (straight + r2.sqrt()).max(f32::MIN_POSITIVE);
+            rest = (rate * more * std::f32::consts::LOG2_E).min(250.0);
         }
         let faces = if through { &self.transmitted } else { &self.reflected };
         // Images of unlike boundaries can turn the far exitance negative: no light.
-        let value = |face: &Face| times_exp(face.compensated(r2, rate), rest).max(0.0);
+        let value = |face: &Face| times_exp2(face.compensated(r2, rate), rest).max(0.0);
         if self.grey { Rgb::splat(value(&faces[0])) } else { Rgb::from_fn(|c| value(&faces[c])) }
     }
 

@@ -2,9 +2,9 @@
 
 use super::Claims;
 use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths, left};
-use crate::math::{Rgb, exp, times_exp};
+use crate::math::{Rgb, exp2, times_exp2};
 use crate::optics::{FresnelMoments, Medium, Reduced, standard_total};
-use std::f64::consts::PI;
+use std::f64::consts::{LOG2_E, PI};
 
 /// The standard dipole [JMLH01]: a point source one transport mean free path l′ below the entry and its image above
 /// the surface, so that fluence vanishes on the extrapolated boundary. With lengths in l′ = 1/σ_t′ and
@@ -25,14 +25,14 @@ pub struct StandardDipole {
 pub struct Pole {
     /// σ_t′² [1/unit²].
     sigma_squared: f32,
-    /// 1 / σ_t′ [unit].
-    length: f32,
+    /// log2 e / σ_t′ [unit]: of a rate, what it takes off `decay_log2`.
+    length_log2: f32,
     /// s.
     decay: f32,
+    /// s log2 e.
+    decay_log2: f32,
     /// z_v.
     z_virtual: f32,
-    /// z_v² - 1.
-    lift: f32,
     /// α′ σ_t′² / 4π, over π and the exit normalisation [1/(unit² sr)].
     scale: f32,
 }
@@ -45,10 +45,10 @@ impl StandardDipole {
         let z_virtual = 1.0 + 4.0 / 3.0 * moments.a_groenhuis();
         let each = medium.channels().map(|k| Pole {
             sigma_squared: finite(k.sigma_t_prime * k.sigma_t_prime),
-            length: length(&k),
+            length_log2: length_log2(&k),
             decay: k.relative_decay() as f32,
+            decay_log2: (LOG2_E * k.relative_decay()) as f32,
             z_virtual: z_virtual as f32,
-            lift: ((z_virtual - 1.0) * (z_virtual + 1.0)) as f32,
             scale: finite(k.alpha_prime * k.sigma_t_prime * k.sigma_t_prime / (4.0 * PI * PI * exit)),
         });
         Self {
@@ -63,9 +63,9 @@ impl StandardDipole {
     }
 }
 
-/// 1 / σ_t′ [unit], 0 where there is no medium.
-pub(super) fn length(k: &Reduced) -> f32 {
-    if k.sigma_t_prime > 0.0 { finite(1.0 / k.sigma_t_prime) } else { 0.0 }
+/// log2 e / σ_t′ [unit], 0 where there is no medium.
+pub(super) fn length_log2(k: &Reduced) -> f32 {
+    if k.sigma_t_prime > 0.0 { finite(LOG2_E / k.sigma_t_prime) } else { 0.0 }
 }
 
 impl Pole {
@@ -74,19 +74,19 @@ impl Pole {
         let s = self.decay;
         let x2 = in_mean_free_paths(r2, self.sigma_squared);
         let (d_r, d_v) = ((x2 + 1.0).sqrt(), (x2 + self.z_virtual * self.z_virtual).sqrt());
-        // One division for 1/d_r, 1/d_v and d_v - d_r, the last without cancellation.
-        let (sum, product) = (d_r + d_v, d_r * d_v);
-        let over = 1.0 / (sum * product);
-        let (i_r, i_v, t) = (over * (d_v * sum), over * (d_r * sum), self.lift * (over * product));
-        let mut exponent = s * d_r;
+        let product = 1.0 / (d_r * d_v);
+        let (i_r, i_v) = (d_v * product, d_r * product);
+        let mut exponent = self.decay_log2 * d_r;
         if COMPENSATED {
             // rate r - s d = -(s - rate) d - rate (d - r), and d - r = z² / (d + r): no cancellation far out.
-            let rate = rate * self.length;
-            exponent = left(s, rate) * d_r + rate / (d_r + x2.sqrt());
+            let rate = rate * self.length_log2;
+            exponent = left(self.decay_log2, rate) * d_r + rate / (d_r + x2.sqrt());
         }
         // z (1 + s d) / d³ as z (1/d + s) / d².
         let (real, image) = ((i_r + s) * (i_r * i_r), self.z_virtual * ((i_v + s) * (i_v * i_v)));
-        times_exp(self.scale * (real + image * exp(-s * t)), -exponent)
+        // exp(-s d_v) over exp(-s d_r); s (d_v - d_r) is no worse than s d_v itself.
+        let image = image * exp2(self.decay_log2 * (d_r - d_v));
+        times_exp2(self.scale * (real + image), -exponent)
     }
 }
 

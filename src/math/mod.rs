@@ -9,7 +9,7 @@ mod rgb;
 #[allow(unsafe_code)] // calls code compiled for instruction sets that it has just looked for; nothing else
 mod simd;
 
-pub use exp::{exp, exp_m1, times_exp};
+pub use exp::{exp2, exp2_m1, times_exp2};
 pub use frame::Frame;
 pub use glam::{DVec2, DVec3, Vec2, Vec3};
 pub use hash::{hash, hash_combine, unit_f32, unit_f64};

@@ -24,14 +24,14 @@ impl FresnelMoments {
     pub fn new(eta: f64) -> Self {
         debug_assert!(eta > 0.0);
         if eta >= 1.0 {
-            let outer = Outer::new(eta);
+            let outer = Outer::new(eta, (eta - 1.0) * (eta + 1.0));
             let cut2 = (eta - 1.0) * (eta + 1.0) / (eta * eta);
             // The totally reflected part of C_1 and the 1 - 2 C_1 of the rest cancel exactly on paper.
             let inside = (1.0 - 2.0 * outer.c1) / (eta * eta);
             let three_c2 = 3.0 * outer.c2_inside + cut2 * cut2.sqrt();
             Self::from_parts(2.0 * outer.c1 / (eta * eta) + cut2, three_c2, inside, 1.0 - 2.0 * outer.c1)
         } else {
-            let outer = Outer::new(1.0 / eta);
+            let outer = Outer::new(1.0 / eta, (1.0 - eta) * (1.0 + eta) / (eta * eta));
             let inside = 1.0 - 2.0 * outer.c1;
             Self::from_parts(2.0 * outer.c1, 3.0 * outer.c2, inside, inside * eta * eta)
         }
@@ -63,10 +63,9 @@ struct Outer {
 }
 
 impl Outer {
-    /// With m = b sinh u, b² = n² - 1, the dense side's n μ is b cosh u and r_s is -exp(-2u): the boundary layer at
+    /// From n and b² = n² - 1, of which n alone has lost the digits beside 1. With m = b sinh u, the dense side's n μ is b cosh u and r_s is -exp(-2u): the boundary layer at
     /// grazing, as thin as b, is gone, so that n beside 1 costs some panels more and no digits.
-    fn new(n: f64) -> Self {
-        let b2 = (n - 1.0) * (n + 1.0);
+    fn new(n: f64, b2: f64) -> Self {
         if b2 == 0.0 {
             return Self { c1: 0.0, c2: 0.0, c2_inside: 0.0 };
         }
