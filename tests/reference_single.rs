@@ -99,7 +99,7 @@ fn the_oblique_profile_integrates_to_the_energy_of_the_brdf() {
             }
         }
         energy *= PI / f64::from(rings * sectors) / f64::from(transmittance(eta, mu));
-        let medium = ChannelMedium { sigma_s: f64::from(0.8_f32), sigma_a: 0.2, g: f64::from(g), eta: f64::from(eta) };
+        let medium = ChannelMedium { sigma_s: f64::from(0.8_f32), sigma_a: 0.2, g: g, eta: f64::from(eta) };
         let sum = over_the_plane(&medium, inside.as_dvec3());
         assert!((sum / energy - 1.0).abs() < 2e-3, "{g} {eta} {mu}: {sum} against {energy}");
     }
