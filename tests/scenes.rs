@@ -143,7 +143,7 @@ fn a_rectangle_lights_by_its_form_factor() {
     for backend in backends() {
         for channel in 0..3 {
             let expected = 0.5 * [3.0, 2.0, 1.0][channel] * form_factor(0.7, 1.0);
-            let found = mean(|_| Direct::new(&scene, 1), &scene, backend, 16, channel);
+            let found = mean(|_| Direct::new(&scene, 1).unwrap(), &scene, backend, 16, channel);
             assert_mean(found, expected, &format!("{}: channel {channel}", backend.name()));
         }
     }
@@ -157,7 +157,7 @@ fn a_blocker_halves_the_light_of_a_rectangle_it_half_covers() {
     let above = "[[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [0, 0, 1.5]\nedge_u = [0, 0.7, 0]\nedge_v = [0.7, 0, 0]\nmaterial = \"lamp\"\n";
     let scene = load(&(SPOT.to_string() + &floor(1.0, "grey") + blocker + above + GREY + LAMP));
     for backend in backends() {
-        let found = mean(|_| Direct::new(&scene, 1), &scene, backend, 16, 0);
+        let found = mean(|_| Direct::new(&scene, 1).unwrap(), &scene, backend, 16, 0);
         assert_mean(found, 0.5 * 0.5 * 3.0 * form_factor(0.7, 1.5), &format!("{}: half shadow", backend.name()));
     }
 }
@@ -168,7 +168,9 @@ fn the_dark_side_of_a_light_lights_nothing() {
         .replace("edge_u = [0, 0.7, 0]\nedge_v = [0.7, 0, 0]", "edge_u = [0.7, 0, 0]\nedge_v = [0, 0.7, 0]");
     let scene = load(&(SPOT.to_string() + &floor(1.0, "grey") + &turned + GREY + LAMP));
     for backend in backends() {
-        assert!(render(&Direct::new(&scene, 1), &scene, backend, 4, 1).pixels.iter().all(|&p| p == Rgb::BLACK));
+        assert!(
+            render(&Direct::new(&scene, 1).unwrap(), &scene, backend, 4, 1).pixels.iter().all(|&p| p == Rgb::BLACK)
+        );
     }
 }
 
@@ -178,7 +180,7 @@ fn a_white_convex_body_vanishes_in_a_white_furnace() {
         + "[environment]\nradiance = 1\n[[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"white\"\n[material.white]\ntype = \"diffuse\"\nalbedo = 1\n";
     let scene = load(&text);
     for backend in backends() {
-        for pixel in render(&Direct::new(&scene, 2), &scene, backend, 8, 1).pixels {
+        for pixel in render(&Direct::new(&scene, 2).unwrap(), &scene, backend, 8, 1).pixels {
             assert!((pixel[0] - 1.0).abs() < 1e-5, "{}: {pixel:?}", backend.name());
         }
     }
@@ -216,7 +218,7 @@ fn a_translucent_plane_in_a_furnace_returns_its_total() {
     for backend in backends() {
         for (channel, total) in totals.into_iter().enumerate() {
             for (specular, expected) in [(false, t21 * total), (true, t21 * total + mirror)] {
-                let of = |seed| Subsurface::new(&scene, SubsurfaceOptions { specular, ..subsurface(seed) });
+                let of = |seed| Subsurface::new(&scene, SubsurfaceOptions { specular, ..subsurface(seed) }).unwrap();
                 let found = mean(of, &scene, backend, 12, channel);
                 assert_mean(found, expected, &format!("{}: channel {channel}, specular {specular}", backend.name()));
             }
@@ -232,7 +234,7 @@ fn without_exit_normalisation_the_exit_takes_its_share() {
     let share = FresnelMoments::new(1.3).four_c_phi_outside;
     let expected = share * f64::from(transmittance(1.3, 1.0)) * dipole_total(3.0, 0.6, 1.3);
     let backend = Backend::preferred();
-    assert_mean(mean(|s| Subsurface::new(&scene, subsurface(s)), &scene, backend, 12, 1), expected, "R_d/π");
+    assert_mean(mean(|s| Subsurface::new(&scene, subsurface(s)).unwrap(), &scene, backend, 12, 1), expected, "R_d/π");
 }
 
 /// Light-sampled and cosine-sampled entry, Sobol and independent points estimate the same integral.
@@ -248,7 +250,13 @@ fn every_way_to_fill_the_cache_has_the_same_mean() {
     );
     let backend = Backend::preferred();
     let run = |entry, points| {
-        mean(|s| Subsurface::new(&scene, SubsurfaceOptions { entry, points, ..subsurface(s) }), &scene, backend, 16, 0)
+        mean(
+            |s| Subsurface::new(&scene, SubsurfaceOptions { entry, points, ..subsurface(s) }).unwrap(),
+            &scene,
+            backend,
+            16,
+            0,
+        )
     };
     let (expected, expected_error) = run(EntrySampling::Light, Points::Sobol);
     for (entry, points) in [(EntrySampling::Cosine, Points::Sobol), (EntrySampling::Cosine, Points::Independent)] {
@@ -285,9 +293,9 @@ fn the_same_bytes_come_out_for_any_number_of_threads() {
         }
     }
     check(&occlusion(), &scene);
-    check(&Direct::new(&scene, 2), &scene);
+    check(&Direct::new(&scene, 2).unwrap(), &scene);
     let options = SubsurfaceOptions { cache_samples: 700, specular: true, ..subsurface(7) };
-    check(&Subsurface::new(&scene, options), &scene);
+    check(&Subsurface::new(&scene, options).unwrap(), &scene);
 }
 
 #[test]
@@ -297,7 +305,7 @@ fn a_grey_medium_in_one_channel_is_the_same_as_in_three() {
     let coloured = grey.replace("sigma_a = 0.6", "sigma_a = [0.6, 0.7, 0.8]");
     let image = |material: &str| {
         let scene = load(&(SPOT.to_string() + "[environment]\nradiance = 1\n" + &floor(1.0, "wax") + material));
-        render(&Subsurface::new(&scene, subsurface(3)), &scene, Backend::preferred(), 1, 3)
+        render(&Subsurface::new(&scene, subsurface(3)).unwrap(), &scene, Backend::preferred(), 1, 3)
     };
     let (one, three) = (image(grey), image(&coloured));
     for (a, b) in one.pixels.iter().zip(&three.pixels) {

@@ -2,10 +2,35 @@
 //! Not for: Fresnel factors of entry and exit (the cache applies each once), light sources, geometry queries.
 //! Read first: [`Bssrdf`], the contract of every model; then `standard.rs`.
 
+mod auto;
+mod beam;
+mod better;
+mod channel;
+mod depth;
+mod directional;
+mod exponential;
+mod multipole;
+mod normalised;
+mod quadrature;
+mod radial;
+mod single;
+mod slab;
 mod standard;
+mod true_albedo;
 
+use crate::error::{Error, Result};
 use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
+pub use auto::{Choice, choose};
+pub use beam::{BeamChannel, KappaExtinction, PhotonBeamDiffusion};
+pub use better::BetterDipole;
+pub use channel::ChannelMedium;
+pub use depth::DepthLaw;
+pub use directional::{DirectionalChannel, DirectionalDipole};
+pub use normalised::{NormalisedDiffusion, WidthFit};
+pub use radial::{EntryColumns, Gather, Radial};
+pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
+pub use slab::Slab;
 pub use standard::StandardDipole;
 
 /// Where and how light goes in.
@@ -50,6 +75,22 @@ pub trait Bssrdf: Sync {
     /// Diffuse reflectance of a half space per entered flux, uniform illumination, in [0, 1] where the model
     /// conserves energy.
     fn total(&self) -> Rgb;
+
+    /// What the model promises; tests hold it to that.
+    fn claims(&self) -> Claims {
+        Claims::default()
+    }
+}
+
+/// What a model promises.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Claims {
+    /// Light scattered once is in S_d; adding single scattering would count it twice.
+    pub first_order: bool,
+    /// Exchanging entry and exit changes nothing.
+    pub reciprocal: bool,
+    /// No more leaves than has entered: totals lie in [0, 1].
+    pub bounded_energy: bool,
 }
 
 /// A model by name.
@@ -57,27 +98,46 @@ pub trait Bssrdf: Sync {
 pub enum ModelName {
     /// [`StandardDipole`].
     Standard,
+    /// [`BetterDipole`].
+    Better,
+    /// [`DirectionalDipole`].
+    Directional,
+    /// [`PhotonBeamDiffusion`].
+    Beam,
+    /// [`NormalisedDiffusion`].
+    Normalised,
+    /// [`Slab`]; needs a thickness.
+    Slab,
+    /// Whichever [`choose`] finds best for the medium.
+    Auto,
 }
 
 impl ModelName {
-    /// All models.
-    pub const ALL: [Self; 1] = [Self::Standard];
+    /// All models, and `auto`.
+    pub const ALL: [Self; 7] =
+        [Self::Standard, Self::Better, Self::Directional, Self::Beam, Self::Normalised, Self::Slab, Self::Auto];
 
     /// The name in scene files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Standard => "standard",
+            Self::Better => "better",
+            Self::Normalised => "normalised",
+            Self::Slab => "slab",
+            Self::Auto => "auto",
+            Self::Directional => "directional",
+            Self::Beam => "beam",
         }
     }
 }
 
 impl std::str::FromStr for ModelName {
-    type Err = crate::Error;
+    type Err = Error;
 
-    fn from_str(name: &str) -> crate::Result<Self> {
+    fn from_str(name: &str) -> Result<Self> {
         Self::ALL.into_iter().find(|m| m.name() == name).ok_or_else(|| {
             let hint = crate::error::did_you_mean(name, Self::ALL.map(Self::name));
-            crate::Error::usage(format!("no BSSRDF model `{name}`{hint}"))
+            Error::usage(format!("no BSSRDF model `{name}`{hint}"))
         })
     }
 }
@@ -86,6 +146,16 @@ impl std::str::FromStr for ModelName {
 pub enum Model {
     /// See [`StandardDipole`].
     Standard(StandardDipole),
+    /// See [`BetterDipole`].
+    Better(BetterDipole),
+    /// See [`NormalisedDiffusion`].
+    Normalised(NormalisedDiffusion),
+    /// See [`Slab`].
+    Slab(Box<Slab>),
+    /// See [`DirectionalDipole`].
+    Directional(DirectionalDipole),
+    /// See [`PhotonBeamDiffusion`].
+    Beam(PhotonBeamDiffusion),
 }
 
 /// Generic work over whichever model is there.
@@ -97,11 +167,91 @@ pub trait ModelVisitor {
 }
 
 impl Model {
-    /// The model called `name` of `medium`. `exit_normalisation` divides S_d by 4 C_phi(1/eta), so that the exit
-    /// Fresnel factor loses no energy; off, dipoles give R_d / π as [JMLH01] prints it.
+    /// The model called `name` of a half space of `medium`. `exit_normalisation` divides S_d by 4 C_phi(1/eta), so
+    /// that the exit Fresnel factor loses no energy; off, dipoles give R_d / π as [JMLH01] prints it.
+    ///
+    /// `slab` without a thickness is its own limit, the standard dipole; see [`Self::with_thickness`]. `auto` is what
+    /// [`choose`] finds.
     pub fn new(name: ModelName, medium: &Medium, exit_normalisation: bool) -> Self {
         match name {
-            ModelName::Standard => Self::Standard(StandardDipole::new(medium, exit_normalisation)),
+            ModelName::Standard | ModelName::Slab => Self::Standard(StandardDipole::new(medium, exit_normalisation)),
+            ModelName::Better => Self::Better(BetterDipole::new(medium, exit_normalisation)),
+            ModelName::Normalised => Self::Normalised(NormalisedDiffusion::new(medium, exit_normalisation)),
+            ModelName::Directional => Self::Directional(DirectionalDipole::new(medium, false)),
+            ModelName::Beam => {
+                Self::Beam(PhotonBeamDiffusion::new(medium, exit_normalisation, KappaExtinction::default()))
+            }
+            // `choose` never answers `Auto`.
+            ModelName::Auto => Self::new(choose(medium, None).name, medium, exit_normalisation),
+        }
+    }
+
+    /// As [`Self::new`] for an object of `thickness` [unit], which `slab` and `auto` heed; the others model a half
+    /// space.
+    ///
+    /// # Errors
+    /// A slab without a thickness, and all that [`Slab::new`] refuses.
+    pub fn with_thickness(
+        name: ModelName,
+        medium: &Medium,
+        thickness: Option<f32>,
+        exit_normalisation: bool,
+    ) -> Result<Self> {
+        let name = if name == ModelName::Auto { choose(medium, thickness).name } else { name };
+        match (name, thickness) {
+            (ModelName::Slab, Some(thickness)) => {
+                Ok(Self::Slab(Box::new(Slab::new(medium, thickness, exit_normalisation)?)))
+            }
+            (ModelName::Slab, None) => Err(Error::scene("the model `slab` needs a `thickness`")),
+            _ => Ok(Self::new(name, medium, exit_normalisation)),
+        }
+    }
+
+    /// One model of every kind that exists for `medium`, the slab five transport mean free paths thick: for tests
+    /// and comparisons.
+    ///
+    /// # Errors
+    /// A medium that no slab can be made of.
+    pub fn all_for(medium: &Medium, exit_normalisation: bool) -> Result<Vec<Self>> {
+        let thickness =
+            5.0 * medium.transport_mean_free_path().0.into_iter().filter(|l| l.is_finite()).fold(0.0, f32::max);
+        ModelName::ALL
+            .into_iter()
+            .filter(|name| *name != ModelName::Auto)
+            .map(|name| Self::with_thickness(name, medium, Some(thickness), exit_normalisation))
+            .collect()
+    }
+
+    /// What it is called.
+    pub fn name(&self) -> ModelName {
+        match self {
+            Self::Standard(_) => ModelName::Standard,
+            Self::Better(_) => ModelName::Better,
+            Self::Normalised(_) => ModelName::Normalised,
+            Self::Directional(_) => ModelName::Directional,
+            Self::Beam(_) => ModelName::Beam,
+            Self::Slab(_) => ModelName::Slab,
+        }
+    }
+
+    /// The model as a function of the distance on a plane, where it is one.
+    pub fn radial(&self) -> Option<&dyn Radial> {
+        match self {
+            Self::Standard(model) => Some(model),
+            Self::Better(model) => Some(model),
+            Self::Normalised(model) => Some(model),
+            Self::Slab(model) => Some(&**model),
+            Self::Directional(_) | Self::Beam(_) => None,
+        }
+    }
+
+    /// The vectorised sum over many entries, where the distance alone decides.
+    pub fn gather(&self) -> Option<&dyn Gather> {
+        match self {
+            Self::Standard(model) => Some(model),
+            Self::Better(model) => Some(model),
+            Self::Normalised(model) => Some(model),
+            Self::Slab(_) | Self::Directional(_) | Self::Beam(_) => None,
         }
     }
 
@@ -109,6 +259,11 @@ impl Model {
     pub fn visit<V: ModelVisitor>(&self, visitor: V) -> V::Out {
         match self {
             Self::Standard(model) => visitor.visit(model),
+            Self::Better(model) => visitor.visit(model),
+            Self::Normalised(model) => visitor.visit(model),
+            Self::Slab(model) => visitor.visit(&**model),
+            Self::Directional(model) => visitor.visit(model),
+            Self::Beam(model) => visitor.visit(model),
         }
     }
 }

@@ -1,13 +1,130 @@
 //! `marmor eval`.
 
-use marmor::Result;
+use marmor::bssrdf::{KappaExtinction, ModelName};
+use marmor::report::{Batch, BatchOptions};
+use marmor::{Error, Result};
+use std::io::{self, BufRead, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 /// Options.
 #[derive(clap::Args)]
-pub struct Args {}
+#[command(after_help = "\
+The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (a plane, normal
+incidence) or x,y,z (exit minus entry), nix,niy,niz and nox,noy,noz (outward unit normals), wx,wy,wz
+(refracted direction inside). `slab` also needs `thickness` and takes `eta_far`. Any unit of length.
+Other columns, empty lines and lines that begin with # pass through.
+
+Appended: S_d [1/(unit² sr)]; with r also `exitance`, M(r) [1/unit²] per entered flux. Results come
+last, so that they win where the input has a column of the same name.
+Exit code 2: bad header or option; 3: bad row, with its line.")]
+pub struct Args {
+    /// BSSRDF model
+    #[arg(long, value_name = "NAME")]
+    model: ModelName,
+    /// Leave out the factor that keeps the exit Fresnel term from losing energy: S_d = R_d / π, as the papers print it
+    #[arg(long)]
+    no_exit_normalisation: bool,
+    /// Model `directional`: scale to the true albedo of the half space
+    #[arg(long)]
+    calibrated: bool,
+    /// Model `beam`: σ_t instead of σ_t′ in the near-field correction
+    #[arg(long)]
+    kappa_full: bool,
+    /// Model `slab`, rows with r: light that leaves by the far face
+    #[arg(long)]
+    transmitted: bool,
+    /// Append exact single scattering on a plane too [1/unit²], as `single`
+    #[arg(long)]
+    single: bool,
+}
+
+/// Results are written when this many bytes are there.
+const BUFFER: usize = 1 << 18;
 
 /// Runs the command.
-pub fn run(_args: Args) -> Result<ExitCode> {
-    Ok(ExitCode::SUCCESS)
+pub fn run(args: Args) -> Result<ExitCode> {
+    let refuse = |given: bool, option: &str, model: ModelName| {
+        if given && args.model != model {
+            return Err(Error::usage(format!("{option} goes with --model {}", model.name())));
+        }
+        Ok(())
+    };
+    refuse(args.calibrated, "--calibrated", ModelName::Directional)?;
+    refuse(args.kappa_full, "--kappa-full", ModelName::Beam)?;
+    refuse(args.transmitted, "--transmitted", ModelName::Slab)?;
+    let options = BatchOptions {
+        model: args.model,
+        exit_normalisation: !args.no_exit_normalisation,
+        calibrated: args.calibrated,
+        kappa: if args.kappa_full { KappaExtinction::Full } else { KappaExtinction::Reduced },
+        transmitted: args.transmitted,
+        single: args.single,
+    };
+    let mut input = io::BufReader::with_capacity(BUFFER, io::stdin().lock());
+    let mut output = io::stdout().lock();
+    let mut out = String::with_capacity(BUFFER + 4096);
+    let outcome = evaluate(&mut input, options, &mut out, |out| {
+        let written = output.write_all(out.as_bytes()).and_then(|()| output.flush());
+        out.clear();
+        written
+    });
+    match outcome {
+        Ok(()) | Err(Stop::ReaderGone) => Ok(ExitCode::SUCCESS),
+        Err(Stop::Error(error)) => Err(error),
+    }
+}
+
+enum Stop {
+    /// Whoever read the output has seen enough: no error.
+    ReaderGone,
+    Error(Error),
+}
+
+/// Reads all of `input`; what was computed before an error is still handed to `flush`.
+fn evaluate(
+    input: &mut impl BufRead,
+    options: BatchOptions,
+    out: &mut String,
+    mut flush: impl FnMut(&mut String) -> io::Result<()>,
+) -> std::result::Result<(), Stop> {
+    let mut flush = |out: &mut String| {
+        flush(out).map_err(|cause| match cause.kind() {
+            io::ErrorKind::BrokenPipe => Stop::ReaderGone,
+            _ => Stop::Error(Error::file(Path::new("standard output"), "write", cause)),
+        })
+    };
+    let (mut batch, mut line, mut number) = (None, String::new(), 0_u64);
+    loop {
+        line.clear();
+        number += 1;
+        let read = input.read_line(&mut line);
+        let read = read.map_err(|cause| {
+            Stop::Error(Error::file(Path::new("standard input"), &format!("read line {number}"), cause))
+        })?;
+        if read == 0 {
+            return flush(out);
+        }
+        let row = line.trim_end_matches(['\n', '\r']).trim_start_matches('\u{feff}');
+        let computed = match &mut batch {
+            _ if row.trim().is_empty() || row.starts_with('#') => {
+                out.push_str(row);
+                Ok(())
+            }
+            None => Batch::new(row, options).map(|new| {
+                out.push_str(row);
+                out.push_str(&new.appended());
+                batch = Some(new);
+            }),
+            Some(batch) => batch.row(row, out).map_err(|e| e.within(format_args!("standard input, line {number}"))),
+        };
+        if let Err(error) = computed {
+            flush(out)?;
+            return Err(Stop::Error(error));
+        }
+        out.push('\n');
+        if out.len() >= BUFFER {
+            flush(out)?;
+        }
+    }
 }

@@ -139,7 +139,7 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
             radius: options.radius.map_or(f32::INFINITY, |r| r as f32),
             rays: options.rays.unwrap_or(4),
         }),
-        MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)),
+        MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)?),
         MethodName::Subsurface => {
             let (entry, points) = if as_notes {
                 (EntrySampling::Cosine, Points::Independent)
@@ -155,7 +155,7 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
                 light_samples,
                 seed,
             };
-            Method::Subsurface(Box::new(Subsurface::new(scene, options)))
+            Method::Subsurface(Box::new(Subsurface::new(scene, options)?))
         }
     })
 }

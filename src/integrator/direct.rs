@@ -2,7 +2,8 @@
 
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::bssrdf::{Bssrdf, Model, ModelVisitor};
+use crate::bssrdf::{Bssrdf, ModelVisitor};
+use crate::error::Result;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::query::{Hit, Ray};
@@ -18,14 +19,17 @@ pub struct Direct {
 
 impl Direct {
     /// `light_samples`: samples of each kind of light per camera ray, at least 1.
-    pub fn new(scene: &Scene, light_samples: u32) -> Self {
+    ///
+    /// # Errors
+    /// A translucent material whose model does not exist for its medium.
+    pub fn new(scene: &Scene, light_samples: u32) -> Result<Self> {
         let light = DirectLight { lights: Lights::new(scene), samples: light_samples };
-        Self { light, albedo: lambertian_albedos(scene) }
+        Ok(Self { light, albedo: lambertian_albedos(scene)? })
     }
 }
 
 /// The Lambertian albedo that stands for each object's surface.
-pub(super) fn lambertian_albedos(scene: &Scene) -> Vec<Rgb> {
+pub(super) fn lambertian_albedos(scene: &Scene) -> Result<Vec<Rgb>> {
     struct Total;
     impl ModelVisitor for Total {
         type Out = Rgb;
@@ -33,10 +37,12 @@ pub(super) fn lambertian_albedos(scene: &Scene) -> Vec<Rgb> {
             model.total()
         }
     }
-    let albedo = |surface: &Surface| match surface {
-        Surface::Diffuse { albedo } => *albedo,
-        Surface::Emissive { .. } => Rgb::BLACK,
-        Surface::Translucent(t) => Model::new(t.model, &t.medium, t.exit_normalisation).visit(Total),
+    let albedo = |surface: &Surface| {
+        Ok(match surface {
+            Surface::Diffuse { albedo } => *albedo,
+            Surface::Emissive { .. } => Rgb::BLACK,
+            Surface::Translucent(t) => t.build()?.visit(Total),
+        })
     };
     scene.objects.iter().map(|o| albedo(&scene.materials[o.material].surface)).collect()
 }

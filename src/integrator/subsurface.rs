@@ -5,6 +5,7 @@ use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
 use crate::cache::{Cache, Filler, GatherTally, notes};
+use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
@@ -52,22 +53,22 @@ struct Body {
 
 impl Subsurface {
     /// Tables for the translucent objects of `scene`, and for no others.
-    pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Self {
+    ///
+    /// # Errors
+    /// A translucent material whose model does not exist for its medium.
+    pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Result<Self> {
         let body = |(index, object): (usize, &crate::scene::Object)| {
-            let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
-            Some(Body {
-                medium: t.medium,
-                model: Model::new(t.model, &t.medium, t.exit_normalisation),
-                table: AreaTable::new(&object.mesh)?,
-                stream: CacheStream::new(options.points, options.seed, index as u64),
-            })
+            let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
+            let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
+            let stream = CacheStream::new(options.points, options.seed, index as u64);
+            Ok(Some(Body { medium: t.medium, model: t.build()?, table, stream }))
         };
-        Self {
+        Ok(Self {
             options,
             light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
-            albedo: lambertian_albedos(scene),
-            bodies: scene.objects.iter().enumerate().map(body).collect(),
-        }
+            albedo: lambertian_albedos(scene)?,
+            bodies: scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?,
+        })
     }
 
     fn shade(&self, view: View<'_>, pass: &[Option<Cache>], ray: &CameraRay, hit: &Hit, tally: &mut Tally) -> Rgb {

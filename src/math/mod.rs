@@ -1,11 +1,18 @@
-//! Numbers that know nothing of light: colours as triples, frames, hashes.
+//! Numbers that know nothing of light: colours as triples, frames, hashes, quadrature, vectorised loops.
 //! Not for: anything with a unit. Read first: `rgb.rs`.
 
+mod exp;
 mod frame;
 mod hash;
+mod quadrature;
 mod rgb;
+#[allow(unsafe_code)] // calls code compiled for instruction sets that it has just looked for; nothing else
+mod simd;
 
+pub use exp::{exp2, exp2_m1, times_exp2};
 pub use frame::Frame;
 pub use glam::{DVec2, DVec3, Vec2, Vec3};
 pub use hash::{hash, hash_combine, unit_f32, unit_f64};
+pub use quadrature::GaussLegendre;
 pub use rgb::Rgb;
+pub use simd::{Kernel, Level, dispatch, dispatch_at};

@@ -3,10 +3,18 @@
 
 mod catalogue;
 mod fresnel;
+mod half_space;
+mod inversion;
 mod medium;
 mod moments;
+mod phase;
+mod validity;
 
-pub use catalogue::{CATALOGUE, Measured, find};
-pub use fresnel::{reflect, reflectance, refract, transmittance};
-pub use medium::Medium;
+pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
+pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
+pub use half_space::Boundary;
+pub use inversion::{AlbedoCurve, AlbedoLaw, better_total, medium_from_colour, standard_total};
+pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;
+pub use phase::HenyeyGreenstein;
+pub use validity::{ChannelOptics, Trust};

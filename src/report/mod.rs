@@ -1,6 +1,15 @@
-//! What a render tells of itself: records, one JSON line a pass.
-//! Not for: printing (`cli`), pictures (`film`). Read first: `records.rs`; docs/records.md has the schema for users.
+//! Numbers -> records, tables and plots. Not for: printing (`cli`), pictures (`film`), or computing what is shown.
+//! Read first: `records.rs` (one JSON line a pass; docs/records.md has the schema for users); `profile.rs` (M(r) of models
+//! against the Monte Carlo truth) with `plot.rs` (the SVG writer); `batch.rs` evaluates the rows of a CSV.
 
+mod batch;
+mod monte_carlo;
+mod plot;
+mod profile;
 mod records;
 
+pub use batch::{Batch, BatchOptions};
+pub use monte_carlo::{Bin, Run, channel_run};
+pub use plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
+pub use profile::{Curve, Profile};
 pub use records::{ErrorFigures, Record, RecordFile};

@@ -66,6 +66,8 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
         "per",
         "scale",
         "model",
+        "thickness",
+        "calibrated",
         "exit_normalisation",
     ];
     m.only("a translucent material", &keys)?;
@@ -82,17 +84,18 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
         let scaled = |c: Rgb| c.map(|v| (f64::from(v) * scale) as f32);
         (medium.sigma_a, medium.sigma_s) = (scaled(medium.sigma_a), scaled(medium.sigma_s));
     }
-    if !medium.sigma_t_prime().is_finite() || !medium.sigma_s.is_finite() {
-        return Err(
-            m.error("the coefficients are too large for single precision once in 1/unit; see `per` and `scale`")
-        );
-    }
-    Ok(Surface::Translucent(Translucent {
+    let medium = medium.checked().map_err(|e| m.error(format!("{e}; see `per` and `scale`")))?;
+    let positive = |n: &Node| n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0);
+    let translucent = Translucent {
         medium,
         model: named_value(m, "model")?.unwrap_or(ModelName::Standard),
+        thickness: m.get("thickness", "a number of units above 0", positive)?.map(|v| v as f32),
+        calibrated: switch(m, "calibrated")?.unwrap_or(false),
         exit_normalisation: switch(m, "exit_normalisation")?.unwrap_or(true),
         source,
-    }))
+    };
+    translucent.build().map_err(|e| m.error(e.to_string()))?;
+    Ok(Surface::Translucent(translucent))
 }
 
 fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64) -> Result<(Medium, String)> {
@@ -135,5 +138,5 @@ fn numbers(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> 
     let sigma_a = m.need("sigma_a", COEFFICIENT, coefficient)?;
     let eta = eta.ok_or_else(|| m.missing("eta", ETA))?;
     let per_unit = |v: [f64; 3]| rgb(v.map(|v| per.map_or(v, |per| v * (unit_in_mm / per))));
-    Ok(Medium { sigma_a: per_unit(sigma_a), sigma_s: per_unit(sigma_s), g: g as f32, eta: eta as f32 })
+    Ok(Medium { sigma_a: per_unit(sigma_a), sigma_s: per_unit(sigma_s), g, eta: eta as f32 })
 }

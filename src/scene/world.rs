@@ -1,7 +1,8 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
 use super::Camera;
-use crate::bssrdf::ModelName;
+use crate::bssrdf::{DirectionalDipole, Model, ModelName};
+use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
@@ -70,8 +71,12 @@ pub enum Surface {
 pub struct Translucent {
     /// Coefficients per scene unit.
     pub medium: Medium,
-    /// BSSRDF model.
+    /// BSSRDF model asked for.
     pub model: ModelName,
+    /// Thickness of a slab [unit], for the models `slab` and `auto`.
+    pub thickness: Option<f32>,
+    /// The model `directional` scaled to the true albedo.
+    pub calibrated: bool,
     /// Divide S_d by 4 C_phi(1/eta), so that the exit Fresnel factor loses no energy.
     pub exit_normalisation: bool,
     /// Where the numbers come from, for logs and headers.
@@ -83,5 +88,18 @@ impl Scene {
     #[inline]
     pub fn surface(&self, object: u32) -> &Surface {
         &self.materials[self.objects[object as usize].material].surface
+    }
+}
+
+impl Translucent {
+    /// The model asked for, of this medium.
+    ///
+    /// # Errors
+    /// A slab without a thickness, or one that is too thin for its medium.
+    pub fn build(&self) -> Result<Model> {
+        if self.model == ModelName::Directional && self.calibrated {
+            return Ok(Model::Directional(DirectionalDipole::new(&self.medium, true)));
+        }
+        Model::with_thickness(self.model, &self.medium, self.thickness, self.exit_normalisation)
     }
 }

@@ -1,0 +1,87 @@
+//! Evaluations of S_d per second, one channel: the scalar code, and the same code vectorised for each instruction set
+//! of this machine. Distances lie in L1 cache and spread over 1e-2..1e2 transport mean free paths.
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)] // a bench prints, and its media are in range
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use marmor::bssrdf::{EntryColumns, Model};
+use marmor::math::{Level, Rgb, Vec3};
+use marmor::optics::Medium;
+use std::hint::black_box;
+use std::time::Instant;
+
+const COUNT: usize = 2048;
+
+fn distances() -> Vec<f32> {
+    (0..COUNT).map(|i| 10.0_f32.powf(4.0 * ((i * 1217 % COUNT) as f32 / COUNT as f32) - 2.0)).collect()
+}
+
+/// Whole milk, red; slab of five transport mean free paths.
+fn models() -> Vec<Model> {
+    let medium = Medium::reduced(Rgb::splat(2.55), Rgb::splat(0.0011), 1.3).unwrap();
+    Model::all_for(&medium, true).unwrap()
+}
+
+/// Evaluations per second of `f`, which makes [`COUNT`] of them: the best of some runs.
+fn rate(mut f: impl FnMut()) -> f64 {
+    let mut best = f64::INFINITY;
+    for _ in 0..20 {
+        let start = Instant::now();
+        for _ in 0..100 {
+            f();
+        }
+        best = best.min(start.elapsed().as_secs_f64());
+    }
+    100.0 * COUNT as f64 / best
+}
+
+fn table() {
+    println!("{:<12} {:>12} {:>24} {:>8} {:>16}", "model", "scalar 1e6/s", "vectorised 1e6/s", "ratio", "gather 1e6/s");
+    let (r, mut out) = (distances(), vec![0.0; COUNT]);
+    let (zero, one) = (vec![0.0; COUNT], vec![1.0; COUNT]);
+    for model in models() {
+        let Some(radial) = model.radial() else { continue };
+        let scalar = rate(|| {
+            for &r in black_box(&r) {
+                black_box(radial.exitance_one(0, black_box(r)));
+            }
+        });
+        let levels: Vec<f64> = Level::available()
+            .into_iter()
+            .map(|level| rate(|| radial.exitance_batch_at(level, 0, black_box(&r), black_box(&mut out))))
+            .collect();
+        let gathered = model.gather().map(|g| {
+            let entries = EntryColumns { x: &r, y: &zero, z: &zero, weight: [&one; 3] };
+            rate(|| {
+                black_box(g.gather(black_box(Vec3::ZERO), entries));
+            })
+        });
+        let shown = levels.iter().map(|v| format!("{:.0}", v / 1e6)).collect::<Vec<_>>().join(" / ");
+        let best = levels.last().copied().unwrap_or(scalar);
+        println!(
+            "{:<12} {:>12.0} {:>24} {:>8.1} {:>16}",
+            model.name().name(),
+            scalar / 1e6,
+            shown,
+            best / scalar,
+            gathered.map_or("-".into(), |v| format!("{:.0}", v / 1e6))
+        );
+    }
+    println!("vectorised: {:?}; gather: grey medium, three weights", Level::available());
+}
+
+fn bench(criterion: &mut Criterion) {
+    table();
+    let (r, mut out) = (distances(), vec![0.0; COUNT]);
+    let mut group = criterion.benchmark_group("exitance");
+    group.throughput(Throughput::Elements(COUNT as u64));
+    for model in models() {
+        let Some(radial) = model.radial() else { continue };
+        group.bench_function(format!("{} vectorised", model.name().name()), |b| {
+            b.iter(|| radial.exitance_batch(0, black_box(&r), black_box(&mut out)));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, bench);
+criterion_main!(benches);

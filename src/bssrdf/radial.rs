@@ -1,0 +1,296 @@
+//! What models share that know the distance between entry and exit alone: one formula per channel, from which come
+//! the value for a pair of points, vectorised batches, and sums over a cache of entry points.
+
+use super::{Bssrdf, Claims, Entry, Exit};
+use crate::math::{Kernel, Level, Rgb, Vec3, dispatch_at};
+
+/// A model that can say M(r): exitance at distance r per flux that entered.
+pub trait Radial: Bssrdf {
+    /// M(r) [1/unit²] at distance `r` ≥ 0 [unit] on a plane, by the code that renders: S_d times π, and times
+    /// 4 C_phi(1/eta) where S_d was divided by it.
+    fn exitance(&self, r: f32) -> Rgb;
+
+    /// [`Self::exitance`] of one `channel`.
+    fn exitance_one(&self, channel: usize, r: f32) -> f32;
+
+    /// M(r) of one `channel` for each `r` [unit], vectorised with `level` or the widest instruction set below it; the
+    /// bits do not depend on it, and are those of [`Self::exitance`]. Extra items of the longer slice are left alone.
+    fn exitance_batch_at(&self, level: Level, channel: usize, r: &[f32], out: &mut [f32]);
+
+    /// [`Self::exitance_batch_at`] with the widest instruction set of this machine.
+    fn exitance_batch(&self, channel: usize, r: &[f32], out: &mut [f32]) {
+        self.exitance_batch_at(Level::best(), channel, r, out);
+    }
+}
+
+/// Points of entry in columns of one length, with what entered at each.
+#[derive(Clone, Copy, Debug)]
+pub struct EntryColumns<'a> {
+    /// Coordinates [unit].
+    pub x: &'a [f32],
+    /// Coordinates [unit].
+    pub y: &'a [f32],
+    /// Coordinates [unit].
+    pub z: &'a [f32],
+    /// Flux or any other weight, per channel.
+    pub weight: [&'a [f32]; 3],
+}
+
+/// A model whose S_d is a function of the distance alone, so that sums over many entries vectorise.
+pub trait Gather: Radial {
+    /// Σ S_d(|x_o - x_i|) weight_i per channel over all entries, to an exit at `x`. Products are rounded to f32 and
+    /// summed in f64 in a fixed order of 16 lanes: the bits do not depend on `level`.
+    fn gather_at(&self, level: Level, x: Vec3, entries: EntryColumns<'_>) -> [f64; 3];
+
+    /// [`Self::gather_at`] with the widest instruction set of this machine.
+    fn gather(&self, x: Vec3, entries: EntryColumns<'_>) -> [f64; 3] {
+        self.gather_at(Level::best(), x, entries)
+    }
+}
+
+/// One channel of a distance-only model.
+///
+/// Implementations are straight-line f32 code, `#[inline(always)]`, with choices by value and no calls that do not
+/// inline: the loops over them are what vectorises.
+pub trait Channel: Copy + Send + Sync {
+    /// S_d [1/(unit² sr)] from r² ≥ 0 [unit²], which may be infinite.
+    fn value(self, r2: f32) -> f32;
+
+    /// S_d exp(rate r), formed in the exponent; `rate` [1/unit] is at most the channel's decay.
+    fn compensated(self, r2: f32, rate: f32) -> f32;
+
+    /// [`Self::value`] of a block; the same bits. For formulas that vectorise in parts only.
+    #[inline(always)]
+    fn values(self, r2: &[f32; BLOCK]) -> [f32; BLOCK] {
+        let mut out = [0.0; BLOCK];
+        for (out, &r2) in out.iter_mut().zip(r2) {
+            *out = self.value(r2);
+        }
+        out
+    }
+}
+
+/// The constants of a distance-only model.
+#[derive(Clone, Copy, Debug)]
+pub struct Channels<C> {
+    /// Red, green, blue.
+    pub each: [C; 3],
+    /// The three do not differ.
+    pub grey: bool,
+    /// Slowest decay [1/unit].
+    pub decay: f32,
+    /// Closed-form total.
+    pub total: Rgb,
+    /// M over S_d [sr].
+    pub exitance: f32,
+}
+
+/// A model that is its channels; all the rest follows.
+pub trait DistanceOnly: Send + Sync {
+    /// Its formula.
+    type Channel: Channel;
+    /// What it promises.
+    const CLAIMS: Claims;
+    /// Its constants.
+    fn channels(&self) -> &Channels<Self::Channel>;
+}
+
+impl<M: DistanceOnly> Bssrdf for M {
+    #[inline]
+    fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
+        let k = self.channels();
+        let r2 = entry.x.distance_squared(exit.x);
+        if k.grey {
+            return Rgb::splat(k.each[0].compensated(r2, rate));
+        }
+        k.each_rgb(|c| c.compensated(r2, rate))
+    }
+
+    #[inline]
+    fn eval(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        let k = self.channels();
+        let r2 = entry.x.distance_squared(exit.x);
+        if k.grey {
+            return Rgb::splat(k.each[0].value(r2));
+        }
+        k.each_rgb(|c| c.value(r2))
+    }
+
+    fn decay(&self) -> f32 {
+        self.channels().decay
+    }
+
+    fn total(&self) -> Rgb {
+        self.channels().total
+    }
+
+    fn claims(&self) -> Claims {
+        M::CLAIMS
+    }
+}
+
+impl<C: Channel> Channels<C> {
+    #[inline(always)]
+    fn each_rgb(&self, f: impl Fn(C) -> f32) -> Rgb {
+        Rgb([f(self.each[0]), f(self.each[1]), f(self.each[2])])
+    }
+}
+
+impl<M: DistanceOnly> Radial for M {
+    fn exitance(&self, r: f32) -> Rgb {
+        let k = self.channels();
+        k.each_rgb(|c| c.value(r * r) * k.exitance)
+    }
+
+    fn exitance_one(&self, channel: usize, r: f32) -> f32 {
+        let k = self.channels();
+        k.each[channel].value(r * r) * k.exitance
+    }
+
+    fn exitance_batch_at(&self, level: Level, channel: usize, r: &[f32], out: &mut [f32]) {
+        let k = self.channels();
+        dispatch_at(level, Batch { channel: k.each[channel], exitance: k.exitance, r, out });
+    }
+}
+
+impl<M: DistanceOnly> Gather for M {
+    fn gather_at(&self, level: Level, x: Vec3, entries: EntryColumns<'_>) -> [f64; 3] {
+        let k = self.channels();
+        dispatch_at(level, Sum { channels: &k.each, grey: k.grey, x, entries })
+    }
+}
+
+/// M(r) of one channel over a slice.
+pub(super) struct Batch<'a, C> {
+    pub channel: C,
+    pub exitance: f32,
+    pub r: &'a [f32],
+    pub out: &'a mut [f32],
+}
+
+impl<C: Channel> Kernel for Batch<'_, C> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let count = self.r.len().min(self.out.len());
+        let (r, out) = (&self.r[..count], &mut self.out[..count]);
+        for (r, out) in r.chunks(BLOCK).zip(out.chunks_mut(BLOCK)) {
+            let mut r2 = [1.0; BLOCK];
+            for (r2, r) in r2.iter_mut().zip(r) {
+                *r2 = r * r;
+            }
+            let values = self.channel.values(&r2);
+            for (out, value) in out.iter_mut().zip(&values) {
+                *out = value * self.exitance;
+            }
+        }
+    }
+}
+
+/// Entries handled between two visits to memory; a multiple of the lanes of the sum.
+pub(super) const BLOCK: usize = 64;
+/// Lanes of the sum, whatever the instruction set.
+const LANES: usize = 16;
+
+struct Sum<'a, C> {
+    channels: &'a [C; 3],
+    grey: bool,
+    x: Vec3,
+    entries: EntryColumns<'a>,
+}
+
+impl<C: Channel> Kernel for Sum<'_, C> {
+    type Out = [f64; 3];
+
+    #[inline(always)]
+    fn run(self) -> [f64; 3] {
+        let e = &self.entries;
+        let count = [e.x, e.y, e.z, e.weight[0], e.weight[1], e.weight[2]].iter().map(|c| c.len()).min().unwrap_or(0);
+        let mut lanes = [[0.0_f64; LANES]; 3];
+        let mut start = 0;
+        while start < count {
+            let block = Columns::load(e, start, count, self.x);
+            let r2 = block.distances(self.x);
+            let mut s = [0.0_f32; BLOCK];
+            for (c, lanes) in lanes.iter_mut().enumerate() {
+                if c == 0 || !self.grey {
+                    s = self.channels[c].values(&r2);
+                }
+                add(lanes, &s, &block.weight[c]);
+            }
+            start += BLOCK;
+        }
+        lanes.map(|l| l.iter().sum())
+    }
+}
+
+#[inline(always)]
+fn add(lanes: &mut [f64; LANES], s: &[f32; BLOCK], weight: &[f32; BLOCK]) {
+    for (s, w) in s.chunks_exact(LANES).zip(weight.chunks_exact(LANES)) {
+        for ((lane, s), w) in lanes.iter_mut().zip(s).zip(w) {
+            *lane += f64::from(s * w);
+        }
+    }
+}
+
+/// A block of entries; past the end, points at the exit that weigh nothing.
+struct Columns {
+    x: [f32; BLOCK],
+    y: [f32; BLOCK],
+    z: [f32; BLOCK],
+    weight: [[f32; BLOCK]; 3],
+}
+
+impl Columns {
+    #[inline(always)]
+    fn load(e: &EntryColumns<'_>, start: usize, count: usize, at: Vec3) -> Self {
+        let column = |source: &[f32], fill: f32| -> [f32; BLOCK] {
+            let rest = &source[start..count];
+            if let Some(full) = rest.first_chunk::<BLOCK>() {
+                return *full;
+            }
+            let mut padded = [fill; BLOCK];
+            padded[..rest.len()].copy_from_slice(rest);
+            padded
+        };
+        Self {
+            x: column(e.x, at.x),
+            y: column(e.y, at.y),
+            z: column(e.z, at.z),
+            weight: e.weight.map(|w| column(w, 0.0)),
+        }
+    }
+
+    #[inline(always)]
+    fn distances(&self, at: Vec3) -> [f32; BLOCK] {
+        let mut r2 = [0.0; BLOCK];
+        for (i, r2) in r2.iter_mut().enumerate() {
+            let (x, y, z) = (self.x[i] - at.x, self.y[i] - at.y, self.z[i] - at.z);
+            *r2 = x * x + y * y + z * z;
+        }
+        r2
+    }
+}
+
+/// The largest squared distance in transport mean free paths that is told from infinity.
+pub(super) const FARTHEST_SQUARED: f32 = 1e24;
+
+/// r² σ², in transport mean free paths, with r² or the product overflowing taken as [`FARTHEST_SQUARED`].
+#[inline(always)]
+pub(super) fn in_mean_free_paths(r2: f32, sigma_squared: f32) -> f32 {
+    let x2 = r2 * sigma_squared;
+    // Also where 0 · ∞ is not a number.
+    if x2 < FARTHEST_SQUARED { x2 } else { FARTHEST_SQUARED }
+}
+
+/// What is left of a `decay` after a `rate` that is at most as large, but for rounding.
+#[inline(always)]
+pub(super) fn left(decay: f32, rate: f32) -> f32 {
+    if decay > rate { decay - rate } else { 0.0 }
+}
+
+/// `value` in f32, finite.
+pub(super) fn finite(value: f64) -> f32 {
+    value.min(1e37) as f32
+}

@@ -1,0 +1,297 @@
+//! Properties that every BSSRDF model has to have; a new model joins by its line in `Model::all_for`.
+#![allow(clippy::unwrap_used)] // media of these tests are in range
+
+use marmor::bssrdf::{Bssrdf, Entry, EntryColumns, Exit, Model, ModelName, ModelVisitor};
+use marmor::math::{GaussLegendre, Level, Rgb, Vec3, hash, unit_f32};
+use marmor::optics::Medium;
+use proptest::prelude::*;
+
+/// One evaluation of whichever model.
+struct Eval(Entry, Exit, f32);
+
+impl ModelVisitor for Eval {
+    type Out = Rgb;
+    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
+        model.eval_compensated(&self.0, &self.1, self.2)
+    }
+}
+
+fn with<T>(model: &Model, f: impl FnOnce(&dyn Bssrdf) -> T) -> T {
+    struct Call<F>(F);
+    impl<T, F: FnOnce(&dyn Bssrdf) -> T> ModelVisitor for Call<F> {
+        type Out = T;
+        fn visit<B: Bssrdf>(self, model: &B) -> T {
+            (self.0)(&Erased(model))
+        }
+    }
+    /// A sized model behind a reference, so that closures need not be generic.
+    struct Erased<'a, B>(&'a B);
+    impl<B: Bssrdf> Bssrdf for Erased<'_, B> {
+        fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
+            self.0.eval_compensated(entry, exit, rate)
+        }
+        fn eval(&self, entry: &Entry, exit: &Exit) -> Rgb {
+            self.0.eval(entry, exit)
+        }
+        fn decay(&self) -> f32 {
+            self.0.decay()
+        }
+        fn total(&self) -> Rgb {
+            self.0.total()
+        }
+        fn claims(&self) -> marmor::bssrdf::Claims {
+            self.0.claims()
+        }
+    }
+    model.visit(Call(f))
+}
+
+/// Entry at the origin of a plane at normal incidence, exit at distance `r`.
+fn plane(r: f32) -> (Entry, Exit) {
+    let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z };
+    (entry, Exit { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w: Vec3::Z })
+}
+
+fn eval_at(model: &Model, r: f32) -> Rgb {
+    let (entry, exit) = plane(r);
+    model.visit(Eval(entry, exit, 0.0))
+}
+
+/// Coefficients over six decades, albedos from dark to white, both sides of index match.
+fn media() -> impl Strategy<Value = Medium> {
+    let coefficient = || (-3.0_f32..3.0).prop_map(|e| 10.0_f32.powf(e));
+    ([coefficient(), coefficient(), coefficient()], [0.0_f32..0.9, 0.0_f32..0.9, 0.0_f32..0.9], 0.4_f32..4.0).prop_map(
+        |(s, a, eta)| {
+            let sigma_a = Rgb::from_fn(|c| s[c] * a[c].powi(4));
+            Medium::reduced(Rgb(s), sigma_a, eta).unwrap()
+        },
+    )
+}
+
+/// A medium whose channels have the same length, so that one r suits all.
+fn even_media() -> impl Strategy<Value = Medium> {
+    ([0.0_f32..0.9, 0.0_f32..0.9, 0.0_f32..0.9], 0.4_f32..4.0).prop_map(|(a, eta)| {
+        let absorbed = a.map(|a| a.powi(4));
+        Medium::reduced(Rgb(absorbed.map(|a| 1.0 - a)), Rgb(absorbed), eta).unwrap()
+    })
+}
+
+fn all(medium: &Medium) -> Vec<Model> {
+    Model::all_for(medium, true).unwrap()
+}
+
+fn unit(seed: u64) -> f32 {
+    unit_f32((hash(seed) >> 32) as u32)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn s_is_a_density_per_area(medium in even_media(), r in 0.01_f32..20.0, k in 0.01_f32..100.0) {
+        for (small, large) in all(&medium).iter().zip(all(&medium.scaled_by(k))) {
+            let (a, b) = (eval_at(small, r), eval_at(&large, k * r) * (k * k));
+            for c in 0..3 {
+                prop_assert!((a[c] - b[c]).abs() <= 2e-5 * a[c].abs() + 1e-30, "{:?}: {a:?} {b:?}", small.name());
+            }
+        }
+    }
+
+    #[test]
+    fn channels_do_not_know_each_other(medium in media(), e in -3.0_f32..1.5) {
+        for c in 0..3 {
+            let one = Medium { sigma_a: Rgb::splat(medium.sigma_a[c]), sigma_s: Rgb::splat(medium.sigma_s[c]), ..medium };
+            let thickness = Some(1e4);
+            // `auto` looks at all channels before it chooses.
+            for name in ModelName::ALL.into_iter().filter(|name| *name != ModelName::Auto) {
+                let make = |m: &Medium| Model::with_thickness(name, m, thickness, true).unwrap();
+                let r = 10.0_f32.powf(e) / medium.sigma_t_prime()[c];
+                let (coloured, grey) = (eval_at(&make(&medium), r), eval_at(&make(&one), r));
+                // Models that integrate over depth choose their nodes by the colour: not to the bit.
+                prop_assert!((coloured[c] - grey[c]).abs() <= 1e-4 * grey[c].abs(), "{name:?}: {coloured:?} {grey:?}");
+                prop_assert!(grey.is_grey());
+            }
+        }
+    }
+
+    #[test]
+    fn reciprocity_where_claimed(medium in even_media(), seed in any::<u64>()) {
+        let random = |i: u64| Vec3::from_array(std::array::from_fn(|k| unit(seed ^ (3 * i + k as u64)) - 0.5));
+        let (x, y) = (random(0) * 4.0, random(1) * 4.0);
+        let (n, m) = (random(2).normalize_or(Vec3::Z), random(3).normalize_or(Vec3::X));
+        for model in all(&medium) {
+            if with(&model, |m| m.claims().reciprocal) {
+                let there = model.visit(Eval(Entry { x, n, w: -n }, Exit { x: y, n: m, w: m }, 0.0));
+                let back = model.visit(Eval(Entry { x: y, n: m, w: -m }, Exit { x, n, w: n }, 0.0));
+                for c in 0..3 {
+                    prop_assert!((there[c] - back[c]).abs() <= 1e-5 * there[c], "{:?}", model.name());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_compensated_value_is_the_value_times_the_exponential(medium in media(), e in -2.0_f32..1.0, part in 0.0_f32..1.0) {
+        for model in all(&medium) {
+            let rate = part * with(&model, |m| m.decay());
+            let r = 10.0_f32.powf(e) * medium.transport_mean_free_path().min();
+            let (entry, exit) = plane(r);
+            let (kept, plain) = (model.visit(Eval(entry, exit, rate)), model.visit(Eval(entry, exit, 0.0)));
+            prop_assert_eq!(plain, with(&model, |m| m.eval(&entry, &exit)));
+            for c in 0..3 {
+                let expected = f64::from(plain[c]) * (f64::from(rate) * f64::from(r)).exp();
+                if plain[c] > 1e-35 {
+                    let error = (f64::from(kept[c]) / expected - 1.0).abs();
+                    prop_assert!(error < 2e-5, "{:?} {c}: {} {expected}", model.name(), kept[c]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn vectorised_loops_give_the_bits_of_the_scalar_code(medium in media(), seed in any::<u64>()) {
+        let length = medium.transport_mean_free_path();
+        // 203 is no multiple of any number of lanes.
+        let r: Vec<f32> = (0..203).map(|i| length[0] * 10.0_f32.powf(9.0 * unit(seed ^ i) - 4.0)).collect();
+        for model in all(&medium) {
+            let Some(radial) = model.radial() else { continue };
+            for level in Level::available() {
+                for c in 0..3 {
+                    let mut out = vec![0.0; r.len()];
+                    radial.exitance_batch_at(level, c, &r, &mut out);
+                    for (r, out) in r.iter().zip(&out) {
+                        let scalar = radial.exitance(*r)[c];
+                        prop_assert_eq!(out.to_bits(), scalar.to_bits(), "{:?} {:?} at {}", model.name(), level, r);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn sums_over_entries_are_sums_of_values(medium in even_media(), seed in any::<u64>(), count in 0_usize..300) {
+        let column = |k: u64| -> Vec<f32> { (0..count as u64).map(|i| 6.0 * unit(seed ^ (k << 32 | i)) - 3.0).collect() };
+        let (x, y, z) = (column(1), column(2), column(3));
+        let weight: [Vec<f32>; 3] = [4, 5, 6].map(|k| column(k).iter().map(|v| v + 3.0).collect());
+        let entries = EntryColumns { x: &x, y: &y, z: &z, weight: [&weight[0], &weight[1], &weight[2]] };
+        let at = Vec3::new(0.1, -0.2, 0.3);
+        for model in all(&medium) {
+            let Some(gather) = model.gather() else { continue };
+            let mut sum = [0.0_f64; 3];
+            for i in 0..count {
+                let entry = Entry { x: Vec3::new(x[i], y[i], z[i]), n: Vec3::Z, w: -Vec3::Z };
+                let s = gather.eval(&entry, &Exit { x: at, n: Vec3::Z, w: Vec3::Z });
+                (0..3).for_each(|c| sum[c] += f64::from(s[c]) * f64::from(weight[c][i]));
+            }
+            let scalar = gather.gather_at(Level::Baseline, at, entries);
+            for level in Level::available() {
+                prop_assert_eq!(gather.gather_at(level, at, entries), scalar, "{:?} {:?}", model.name(), level);
+            }
+            for c in 0..3 {
+                // Distances of glam and of the loop round differently; products are rounded to f32.
+                prop_assert!((scalar[c] - sum[c]).abs() <= 2e-6 * sum[c], "{:?}: {scalar:?} {sum:?}", model.name());
+            }
+        }
+    }
+
+    #[test]
+    fn energy_where_claimed(medium in media()) {
+        for model in all(&medium) {
+            let (claims, total) = with(&model, |m| (m.claims(), m.total()));
+            if claims.bounded_energy {
+                prop_assert!(total.min() >= 0.0 && total.max() <= 1.0 + 1e-6, "{:?}: {total:?}", model.name());
+            }
+        }
+    }
+}
+
+/// 2π ∫ r M(r) dr over all r, of a channel.
+fn integral(model: &Model, channel: usize, length: f64) -> Option<f64> {
+    let radial = model.radial()?;
+    // r = length · exp(v); beyond, an r⁻³ tail is a half of its first ring.
+    let rule = GaussLegendre::new(16);
+    let ring = |r: f64| 2.0 * std::f64::consts::PI * r * r * f64::from(radial.exitance(r as f32)[channel]);
+    let body = rule.integrate_panels(-14.0, 14.0, 56, |v| ring(length * v.exp()));
+    Some(body + ring(length * 14.0_f64.exp()))
+}
+
+#[test]
+fn closed_form_totals_are_the_integrals_of_the_profile() {
+    for eta in [0.75_f32, 1.0, 1.3, 1.5, 2.5] {
+        for absorbed in [[0.0_f32, 1e-4, 1e-2], [0.1, 0.5, 0.9]] {
+            let medium =
+                Medium::reduced(Rgb(absorbed.map(|a| 2.0 - 2.0 * a)), Rgb(absorbed.map(|a| 2.0 * a)), eta).unwrap();
+            for model in all(&medium) {
+                let total = with(&model, |m| m.total());
+                for c in 0..3 {
+                    let Some(sum) = integral(&model, c, 0.5) else { continue };
+                    let exact = f64::from(total[c]);
+                    assert!(
+                        (sum / exact - 1.0).abs() < 1e-5,
+                        "{:?} {eta} {}: {sum} {exact}",
+                        model.name(),
+                        absorbed[c]
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Every combination of the ends of each range has a finite value, and 0 where nothing scatters.
+#[test]
+fn no_input_gives_nan_or_infinity() {
+    let numbers = [0.0_f32, 1e-6, 1.0, 1e6];
+    for sigma_s in numbers {
+        for sigma_a in [0.0_f32, 1e-12, 1e-6, 1.0, 1e6] {
+            for g in [-0.9, 0.0, 0.999, 1.0 - 1e-9] {
+                for eta in [0.4_f32, 0.75, 1.0, 1.000_000_1, 1.3, 4.0] {
+                    // Slabs of five mean free paths, and none where there is no medium.
+                    let medium = Medium::unreduced(Rgb::splat(sigma_s), Rgb::splat(sigma_a), g, eta).unwrap();
+                    for model in all(&medium) {
+                        for r in [0.0_f32, 1e-20, 1e-6, 1.0, 1e4, 1e10, 1e19, f32::MAX] {
+                            let value = eval_at(&model, r);
+                            let case = format!("{:?} s {sigma_s} a {sigma_a} g {g} eta {eta} r {r}", model.name());
+                            assert!(value.is_finite() && value.min() >= 0.0, "{case}: {value:?}");
+                            assert!(sigma_s > 0.0 || value.is_black(), "{case}: {value:?}");
+                            let rate = with(&model, |m| m.decay());
+                            let (entry, exit) = plane(r);
+                            let kept = model.visit(Eval(entry, exit, rate));
+                            assert!(kept.is_finite() && kept.min() >= 0.0, "{case}: compensated {kept:?}");
+                        }
+                        let (total, decay) = with(&model, |m| (m.total(), m.decay()));
+                        assert!(total.is_finite() && decay.is_finite() && decay >= 0.0, "{:?}", model.name());
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn far_away_there_is_no_light_and_near_by_there_is() {
+    let medium = Medium::reduced(Rgb::splat(1.0), Rgb([0.0, 0.01, 1.0]), 1.3).unwrap();
+    for model in all(&medium) {
+        let (near, far) = (eval_at(&model, 1e-3), eval_at(&model, 1e7));
+        assert!(near.min() > 0.0, "{:?}: {near:?}", model.name());
+        // Without absorption the slowest fall is r⁻³.
+        for c in 0..3 {
+            assert!(far[c] <= 1e-20 * near[c], "{:?}: {far:?} against {near:?}", model.name());
+        }
+    }
+}
+
+/// Without absorption, far out: R_d r³ → (z_r + z_v)/4π for the standard dipole.
+#[test]
+fn the_far_field_of_a_white_medium_is_a_dipole() {
+    let medium = Medium::reduced(Rgb::splat(1.0), Rgb::BLACK, 1.3).unwrap();
+    for model in all(&medium).iter().take(2) {
+        let radial = model.radial().unwrap();
+        let at = |r: f32| f64::from(radial.exitance(r)[0]) * f64::from(r).powi(3);
+        assert!((at(1e4) / at(1e3) - 1.0).abs() < 1e-4, "{:?}: {} {}", model.name(), at(1e4), at(1e3));
+        let expected = 5.467 / (4.0 * std::f64::consts::PI);
+        if model.name() == marmor::bssrdf::ModelName::Standard {
+            assert!((at(1e4) / expected - 1.0).abs() < 1e-3, "{} {expected}", at(1e4));
+        }
+    }
+}

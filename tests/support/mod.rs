@@ -1,0 +1,89 @@
+//! Reference tables: reading them, and the bar that models are held to.
+#![allow(dead_code)] // each test file uses its part
+#![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// One row of a CSV file by column name.
+pub struct Row {
+    names: Arc<HashMap<String, usize>>,
+    cells: Vec<String>,
+}
+
+impl Row {
+    pub fn text(&self, name: &str) -> &str {
+        &self.cells[*self.names.get(name).unwrap_or_else(|| panic!("no column `{name}`"))]
+    }
+
+    pub fn has(&self, name: &str) -> bool {
+        self.names.contains_key(name)
+    }
+
+    pub fn number(&self, name: &str) -> f64 {
+        self.text(name).parse().unwrap_or_else(|_| panic!("`{}` in `{name}`", self.text(name)))
+    }
+}
+
+fn read(path: &Path) -> Vec<Row> {
+    let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    let mut lines = text.lines().filter(|line| !line.is_empty());
+    let cells = |line: &str| line.split(',').map(str::to_string).collect::<Vec<_>>();
+    let header = cells(lines.next().unwrap());
+    let names = Arc::new(header.into_iter().enumerate().map(|(i, name)| (name, i)).collect::<HashMap<_, _>>());
+    let rows: Vec<_> = lines.map(|line| Row { names: names.clone(), cells: cells(line) }).collect();
+    assert!(!rows.is_empty(), "{} is empty", path.display());
+    rows
+}
+
+/// A file of tests/data.
+pub fn table(name: &str) -> Vec<Row> {
+    read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name))
+}
+
+/// The file `name` of the folder in `MARMOR_REFERENCE_DIR`, the whole tables that tests/data has samples of; `None`
+/// where the variable is not set.
+pub fn whole_table(name: &str) -> Option<Vec<Row>> {
+    std::env::var_os("MARMOR_REFERENCE_DIR").map(|folder| read(&Path::new(&folder).join(name)))
+}
+
+/// Relative errors of f32 results against a table.
+#[derive(Default)]
+pub struct Score {
+    errors: Vec<(f64, String)>,
+    not_finite: Vec<String>,
+    beyond: usize,
+}
+
+impl Score {
+    /// One row. Values outside the range of normal f32 have to come out as finite numbers, no more.
+    pub fn add(&mut self, row: &Row, value: f32, truth: f64) {
+        let label = format!("{} {value:e} {truth:e}", row.text("id"));
+        if !value.is_finite() {
+            self.not_finite.push(label);
+        } else if truth != 0.0 && !(f64::from(f32::MIN_POSITIVE)..=f64::from(f32::MAX)).contains(&truth.abs()) {
+            self.beyond += 1;
+        } else if truth == 0.0 {
+            self.errors.push((if value == 0.0 { 0.0 } else { f64::INFINITY }, label));
+        } else {
+            self.errors.push(((f64::from(value) / truth - 1.0).abs(), label));
+        }
+    }
+
+    /// Relative error below 2e-5 in 99.5 % of the rows and below 1e-3 in all; nothing NaN or infinite.
+    pub fn hold(mut self, name: &str) {
+        self.errors.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let share =
+            |bar: f64| 100.0 * self.errors.iter().filter(|e| e.0 < bar).count() as f64 / self.errors.len() as f64;
+        let (fine, coarse) = (share(2e-5), share(1e-3));
+        println!(
+            "{name}: {} rows, {} beyond f32; < 2e-5: {fine:.3} %, < 1e-3: {coarse:.3} %, largest {:?}",
+            self.errors.len(),
+            self.beyond,
+            &self.errors[..5.min(self.errors.len())]
+        );
+        assert!(self.not_finite.is_empty(), "{name}: {:?}", self.not_finite);
+        assert!(fine >= 99.5 && coarse >= 100.0, "{name}: {:?}", &self.errors[..20.min(self.errors.len())]);
+    }
+}
