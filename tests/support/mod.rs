@@ -1,5 +1,6 @@
 //! Reference tables: reading them, and the bar that models are held to.
 #![allow(dead_code)] // each test file uses its part
+#![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -14,6 +15,10 @@ pub struct Row {
 impl Row {
     pub fn text(&self, name: &str) -> &str {
         &self.cells[*self.names.get(name).unwrap_or_else(|| panic!("no column `{name}`"))]
+    }
+
+    pub fn has(&self, name: &str) -> bool {
+        self.names.contains_key(name)
     }
 
     pub fn number(&self, name: &str) -> f64 {
