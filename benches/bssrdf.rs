@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)] // a bench prints, and its media are in range
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use marmor::bssrdf::{EntryColumns, Model};
+use marmor::bssrdf::{Bssrdf, Entry, EntryColumns, Exit, Model, ModelVisitor};
 use marmor::math::{Level, Rgb, Vec3};
 use marmor::optics::Medium;
 use std::hint::black_box;
@@ -32,6 +32,27 @@ fn rate(mut f: impl FnMut()) -> f64 {
         best = best.min(start.elapsed().as_secs_f64());
     }
     100.0 * COUNT as f64 / best
+}
+
+/// Whole milk, all channels.
+fn coloured() -> Vec<Model> {
+    let medium = Medium::reduced(Rgb([2.55, 3.21, 3.77]), Rgb([0.0011, 0.0024, 0.014]), 1.3).unwrap();
+    Model::all_for(&medium, true).unwrap()
+}
+
+/// Evaluations of S_d in three channels, one pair of points after the other.
+struct Pairs<'a>(&'a [f32]);
+
+impl ModelVisitor for Pairs<'_> {
+    type Out = f64;
+    fn visit<B: Bssrdf>(self, model: &B) -> f64 {
+        let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z };
+        rate(|| {
+            for &r in black_box(self.0) {
+                black_box(model.eval(&entry, &Exit { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w: Vec3::Z }));
+            }
+        })
+    }
 }
 
 fn table() {
@@ -64,6 +85,13 @@ fn table() {
             shown,
             best / scalar,
             gathered.map_or("-".into(), |v| format!("{:.0}", v / 1e6))
+        );
+    }
+    for model in coloured() {
+        println!(
+            "{:<12} {:>12.0} 1e6 pairs of points per second, three channels",
+            model.name().name(),
+            model.visit(Pairs(&r)) / 1e6
         );
     }
     println!("vectorised: {:?}; gather: grey medium, three weights", Level::available());

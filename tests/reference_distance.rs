@@ -1,4 +1,4 @@
-//! Boundaries, constants and distance-only models against high-precision tables: tests/data/README.md says where the
+//! Boundaries, constants and distance-only models against high-precision tables: tests/data/README-distance.md says where the
 //! rows come from. With `MARMOR_REFERENCE_DIR` set, against the whole tables.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a table that cannot be read is a failed test; scores are shown
 

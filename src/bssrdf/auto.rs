@@ -22,6 +22,9 @@ const LARGEST_G: f64 = 0.8;
 /// Thickness from which a slab is trusted [transport mean free paths].
 const LEAST_THICKNESS: f64 = 2.0;
 
+/// Thickness from which a slab is a half space [transport mean free paths].
+const MOST_THICKNESS: f64 = 1e4;
+
 /// The best model there is for `medium`, in a slab of `thickness` [unit] if the object is one.
 pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
     let scattering = || medium.channels().into_iter().filter(|k| k.alpha_prime > 0.0);
@@ -34,8 +37,10 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
         };
     }
     if let Some(thickness) = thickness {
-        let relative = scattering().map(|k| k.sigma_t_prime).fold(f64::INFINITY, f64::min) * f64::from(thickness);
-        if relative > LEAST_THICKNESS && relative < 1e4 {
+        let in_paths = |sigma: f64| sigma * f64::from(thickness);
+        let relative = in_paths(scattering().map(|k| k.sigma_t_prime).fold(f64::INFINITY, f64::min));
+        let densest = in_paths(scattering().map(|k| k.sigma_t_prime).fold(0.0, f64::max));
+        if relative > LEAST_THICKNESS && densest < MOST_THICKNESS {
             let why = format!("a slab {relative:.1} transport mean free paths thick: both faces count");
             return Choice { name: ModelName::Slab, why, trusted: albedo > LEAST_ALBEDO };
         }
@@ -82,6 +87,8 @@ mod tests {
         let slab = choose(&medium(2.55, 0.0011, 0.0), Some(4.0));
         assert!(slab.trusted && slab.name == ModelName::Slab, "{slab:?}");
         assert!(!choose(&medium(2.55, 0.0011, 0.0), Some(0.5)).trusted);
+        assert_eq!(choose(&medium(2.55, 0.0011, 0.0), Some(1e6)).name, half_space());
+        assert!(!choose(&medium(2.55, 0.0011, 0.0), Some(f32::NAN)).why.is_empty());
         assert_ne!(choose(&medium(0.0, 1.0, 0.0), None).name, ModelName::Auto);
     }
 }

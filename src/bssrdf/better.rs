@@ -1,7 +1,7 @@
 //! The better dipole.
 
 use super::Claims;
-use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths, left};
+use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, in_mean_free_paths, left};
 use super::standard::length_log2;
 use crate::math::{Rgb, exp2_m1, times_exp2};
 use crate::optics::{FresnelMoments, Medium, better_total};
@@ -72,6 +72,7 @@ impl BetterDipole {
         Self {
             channels: Channels {
                 each,
+                columns: Pairs::of(each),
                 grey: medium.is_grey(),
                 decay: decay as f32,
                 total: Rgb::from_fn(|c| better_total(&medium.channel(c), &moments) as f32),
@@ -103,7 +104,13 @@ impl Pair {
     }
 }
 
+columns!(Pair, Pairs { sigma_squared, length_log2, decay, decay_log2, z_virtual, lift, fluence, flux, scale });
+
 impl Channel for Pair {
+    type Columns = Pairs;
+}
+
+impl Formula for Pair {
     #[inline(always)]
     fn value(self, r2: f32) -> f32 {
         self.eval::<false>(r2, 0.0)

@@ -267,3 +267,44 @@ impl Model {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_read_back_and_a_slip_is_met_with_the_nearest() {
+        for name in ModelName::ALL {
+            assert_eq!(name.name().parse::<ModelName>().unwrap(), name);
+        }
+        let slip = "standart".parse::<ModelName>().unwrap_err().to_string();
+        assert!(slip.contains("did you mean `standard`"), "{slip}");
+    }
+
+    #[test]
+    fn a_slab_has_a_thickness_and_auto_becomes_a_model() {
+        let medium = Medium::reduced(Rgb::splat(2.0), Rgb::splat(0.01), 1.3).unwrap();
+        let make = |name, thickness| Model::with_thickness(name, &medium, thickness, true);
+        assert!(make(ModelName::Slab, None).err().unwrap().to_string().contains("thickness"));
+        assert!(make(ModelName::Slab, Some(0.4)).is_err());
+        assert_eq!(make(ModelName::Slab, Some(3.0)).unwrap().name(), ModelName::Slab);
+        assert_eq!(make(ModelName::Auto, Some(3.0)).unwrap().name(), ModelName::Slab);
+        assert_eq!(make(ModelName::Auto, None).unwrap().name(), choose(&medium, None).name);
+        assert_eq!(Model::new(ModelName::Better, &medium, true).name(), ModelName::Better);
+    }
+
+    #[test]
+    fn exit_normalisation_divides_s_d_and_leaves_the_exitance() {
+        let medium = Medium::reduced(Rgb::splat(2.0), Rgb::splat(0.01), 1.5).unwrap();
+        for name in [ModelName::Standard, ModelName::Better, ModelName::Normalised] {
+            let [on, off] = [true, false].map(|n| Model::new(name, &medium, n));
+            let (on, off) = (on.radial().unwrap(), off.radial().unwrap());
+            let (entry, exit) =
+                (Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z }, Exit { x: Vec3::X, n: Vec3::Z, w: Vec3::Z });
+            let ratio = off.eval(&entry, &exit)[0] / on.eval(&entry, &exit)[0];
+            // 4 C_phi(1/1.5)
+            assert!((ratio - 0.908_222).abs() < 1e-6, "{name:?}: {ratio}");
+            assert!((on.exitance(1.0)[0] / off.exitance(1.0)[0] - 1.0).abs() < 1e-6, "{name:?}");
+        }
+    }
+}

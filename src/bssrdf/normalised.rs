@@ -1,7 +1,7 @@
 //! Normalised diffusion.
 
 use super::Claims;
-use super::radial::{Channel, Channels, DistanceOnly, finite, left};
+use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, left};
 use crate::error::{Error, Result};
 use crate::math::{Rgb, exp2};
 use crate::optics::{FresnelMoments, Medium, standard_total};
@@ -113,6 +113,7 @@ impl NormalisedDiffusion {
         Self {
             channels: Channels {
                 each,
+                columns: Widths::of(each),
                 grey: r == g && g == b,
                 decay: channels.iter().map(|(_, d)| finite(1.0 / (3.0 * d))).fold(f32::INFINITY, f32::min),
                 total: Rgb(channels.map(|(albedo, _)| albedo as f32)),
@@ -161,7 +162,13 @@ impl NormalisedDiffusion {
     }
 }
 
+columns!(Width, Widths { decay_log2, core, scale });
+
 impl Channel for Width {
+    type Columns = Widths;
+}
+
+impl Formula for Width {
     #[inline(always)]
     fn value(self, r2: f32) -> f32 {
         let r = self.outside_core(r2);

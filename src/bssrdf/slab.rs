@@ -1,7 +1,7 @@
 //! The multipole: a slab between two boundaries.
 
 use super::multipole::Multipole;
-use super::radial::{BLOCK, Batch, Channel, Radial, finite, in_mean_free_paths, left};
+use super::radial::{BLOCK, Batch, Formula, Radial, finite, in_mean_free_paths, left};
 use super::standard::length_log2;
 use super::{Bssrdf, Claims, Entry, Exit};
 use crate::error::{Error, Result};
@@ -238,7 +238,7 @@ fn through_thirds([a, b, c, d]: [f64; 4]) -> [f64; 4] {
     ]
 }
 
-impl Channel for &Face {
+impl Formula for &Face {
     #[inline(always)]
     fn value(self, r2: f32) -> f32 {
         self.eval::<false>(r2, 0.0)

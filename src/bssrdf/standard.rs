@@ -1,7 +1,7 @@
 //! The standard dipole.
 
 use super::Claims;
-use super::radial::{Channel, Channels, DistanceOnly, finite, in_mean_free_paths, left};
+use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, in_mean_free_paths, left};
 use crate::math::{Rgb, exp2, times_exp2};
 use crate::optics::{FresnelMoments, Medium, Reduced, standard_total};
 use std::f64::consts::{LOG2_E, PI};
@@ -54,6 +54,7 @@ impl StandardDipole {
         Self {
             channels: Channels {
                 each,
+                columns: Poles::of(each),
                 grey: medium.is_grey(),
                 decay: medium.sigma_tr().min(),
                 total: Rgb::from_fn(|c| standard_total(&medium.channel(c), &moments) as f32),
@@ -90,7 +91,13 @@ impl Pole {
     }
 }
 
+columns!(Pole, Poles { sigma_squared, length_log2, decay, decay_log2, z_virtual, scale });
+
 impl Channel for Pole {
+    type Columns = Poles;
+}
+
+impl Formula for Pole {
     #[inline(always)]
     fn value(self, r2: f32) -> f32 {
         self.eval::<false>(r2, 0.0)
