@@ -15,6 +15,8 @@
 //!
 //! The command line is the binary's own room, `cli`, above all of these.
 #![deny(unsafe_code)]
+// Units [mm] and citation keys [JMLH01] stand in brackets; links are written out where they are meant.
+#![allow(rustdoc::broken_intra_doc_links)]
 
 #[cfg(not(any(feature = "bvh", feature = "embree")))]
 compile_error!("marmor needs a ray backend: enable the feature `bvh` (pure Rust) or `embree` (system Embree)");

@@ -104,7 +104,9 @@ pub fn run<I: Integrator>(
             _ if job.time.is_some_and(|limit| outcome.seconds.total() >= limit.as_secs_f64()) => Stop::Time,
             _ if job.cancel.load(Ordering::Relaxed) && film.passes() > 0 => Stop::Cancelled,
             _ => {
-                render_pass(integrator, view, job, film, &tiles, &mut outcome);
+                if !render_pass(integrator, view, job, film, &tiles, &mut outcome) {
+                    continue;
+                }
                 let progress = Progress { film, seconds: outcome.seconds, tally: &outcome.tally, job };
                 for observer in observers.iter_mut() {
                     observer.after_pass(&progress)?;
@@ -116,7 +118,8 @@ pub fn run<I: Integrator>(
     }
 }
 
-/// One sample of each pixel. Cancelled in its middle, it leaves the film as it was, unless the film is empty.
+/// One sample of each pixel. Cancelled in its middle, it leaves the film as it was and says `false`, unless the film is
+/// empty: a first pass is always finished.
 fn render_pass<I: Integrator>(
     integrator: &I,
     view: View<'_>,
@@ -124,7 +127,7 @@ fn render_pass<I: Integrator>(
     film: &mut Film,
     tiles: &[Window],
     outcome: &mut Outcome,
-) {
+) -> bool {
     let (pass, mut tally, start) = (film.passes(), Tally::default(), Instant::now());
     let shared = integrator.begin_pass(view, pass, &mut tally);
     let filled = Instant::now();
@@ -137,13 +140,14 @@ fn render_pass<I: Integrator>(
         .collect();
     outcome.seconds.cache += (filled - start).as_secs_f64();
     outcome.seconds.gather += filled.elapsed().as_secs_f64();
-    let Some(rendered) = rendered.into_iter().collect::<Option<Vec<_>>>() else { return };
+    let Some(rendered) = rendered.into_iter().collect::<Option<Vec<_>>>() else { return false };
     for (&tile, (samples, work)) in tiles.iter().zip(rendered) {
         film.add(tile, &samples);
         tally += work;
     }
     outcome.tally += tally;
     film.end_pass();
+    true
 }
 
 fn render_tile<I: Integrator>(
