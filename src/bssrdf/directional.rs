@@ -84,10 +84,12 @@ struct Pair {
 impl Pair {
     /// From x = x_o - x_i, the outward normal of the entry, the refracted direction and the outward normal of the
     /// exit. Normals need not be of unit length.
+    #[inline(always)]
     fn new(x: DVec3, n_i: DVec3, w: DVec3, n_o: DVec3) -> Self {
-        let star = modified_normal(x, n_i);
+        let r = x.length();
+        let star = modified_normal(x, r, n_i);
         Self {
-            r: x.length(),
+            r,
             rho: x.cross(w).length(),
             x_w: x.dot(w),
             x_n: x.dot(n_o),
@@ -101,13 +103,18 @@ impl Pair {
 /// n*: `n` made orthogonal to `x`, normalised; `n` itself where `x` is 0. From the double cross product, because
 /// subtracting the component along `x` loses all digits where the two are nearly parallel. Where they are parallel
 /// every orthogonal direction is as good, and one is taken that depends on `x` alone.
-fn modified_normal(x: DVec3, n: DVec3) -> DVec3 {
-    let Some(along) = x.try_normalize() else { return n };
+///
+/// Straight-line code with choices by value, as all of the kernel, so that loops over pairs vectorise.
+#[inline(always)]
+fn modified_normal(x: DVec3, r: f64, n: DVec3) -> DVec3 {
+    let along = x * if r > 0.0 { 1.0 / r } else { 0.0 };
     let side = n.cross(along);
-    if side.length_squared() > 1e-28 {
-        return along.cross(side).normalize();
-    }
-    along.any_orthonormal_vector()
+    let axis = if along.x.abs() < 0.8 { DVec3::X } else { DVec3::Y };
+    let other = along.cross(axis);
+    let parallel = side.length_squared() <= 1e-28;
+    let side = if parallel { other } else { side };
+    let star = along.cross(side) * (1.0 / side.length());
+    if r > 0.0 { star } else { n }
 }
 
 impl DirectionalChannel {
@@ -150,26 +157,17 @@ impl DirectionalChannel {
     ///   1/d_r - q/d_v             = (u - m) / d_v
     ///   k_r/d_r³ - q k_v/d_v³     = [k_r (u (1 + v + v²) - m) - q s t] / d_v³,                 k = 1 + s d
     ///   j_r/d_r⁵ - q j_v/d_v⁵     = [j_r (u (1 + v + v² + v³ + v⁴) - m) - q (j_v - j_r)] / d_v⁵,  j = 3 k + (s d)²
-    #[inline]
+    #[inline(always)]
     fn kernel(&self, pair: &Pair, gain: f64) -> f64 {
-        if self.scale == 0.0 {
-            return 0.0;
-        }
         let (s, h, length) = (self.s, self.h, self.sigma_t_prime);
         let (r, rho, x_w, x_n) = (pair.r * length, pair.rho * length, pair.x_w * length, pair.x_n * length);
         let r2 = r * r;
-        let beyond = if pair.mu_0 > 0.0 {
-            // D = 1/3; rho / sqrt(r² + d_e²) is -cos b.
-            let lift = pair.mu_0 / 3.0;
-            lift * (lift + 2.0 * self.d_e * rho / (r2 + self.d_e * self.d_e).sqrt())
-        } else {
-            self.back2
-        };
+        // D = 1/3; rho / sqrt(r² + d_e²) is -cos b.
+        let lift = pair.mu_0 / 3.0;
+        let facing = lift * (lift + 2.0 * self.d_e * rho / (r2 + self.d_e * self.d_e).sqrt());
+        // An exit at right angles to the ray at r = 0 would be at no distance.
+        let beyond = if pair.mu_0 > 0.0 { facing } else { self.back2 }.max(1e-80);
         let (d_r, d_v) = ((r2 + beyond).sqrt(), (r2 + h * h).sqrt());
-        let exponent = gain - s * d_r;
-        if exponent < -700.0 {
-            return 0.0;
-        }
         let t = (h * h - beyond) / (d_v + d_r);
         let m = exp_m1(-s * t);
         let q = 1.0 + m;
@@ -191,7 +189,7 @@ impl DirectionalChannel {
         let sum = 3.0 * c_phi * first
             + (p * third - p_more * q * k_v * over3)
             + (o * fifth - o_more * q * j_v * over3 * over * over);
-        self.scale * sum * exp(exponent)
+        self.scale * sum * exp(gain - s * d_r)
     }
 
     /// Exitance over the plane, normal incidence, per entered flux, of the clamped model.
