@@ -3,20 +3,36 @@
 //! Read first: [`Bssrdf`], the contract of every model; then `standard.rs`.
 
 mod auto;
+mod beam;
+mod beam_gather;
 mod better;
+mod channel;
+mod depth;
+mod directional;
+mod directional_gather;
+mod exponential;
 mod multipole;
 mod normalised;
 mod radial;
+mod single;
 mod slab;
 mod standard;
+mod true_albedo;
 
 use crate::error::{Error, Result};
 use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
 pub use auto::{Choice, choose};
+pub use beam::{BeamChannel, KappaExtinction, PhotonBeamDiffusion};
+pub use beam_gather::SourceColumns;
 pub use better::BetterDipole;
+pub use channel::ChannelMedium;
+pub use depth::DepthLaw;
+pub use directional::{DirectionalChannel, DirectionalDipole};
+pub use directional_gather::DirectionColumns;
 pub use normalised::{NormalisedDiffusion, WidthFit};
 pub use radial::{EntryColumns, Gather, Radial};
+pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
 pub use slab::Slab;
 pub use standard::StandardDipole;
 
@@ -87,6 +103,10 @@ pub enum ModelName {
     Standard,
     /// [`BetterDipole`].
     Better,
+    /// [`DirectionalDipole`].
+    Directional,
+    /// [`PhotonBeamDiffusion`].
+    Beam,
     /// [`NormalisedDiffusion`].
     Normalised,
     /// [`Slab`]; needs a thickness.
@@ -97,13 +117,16 @@ pub enum ModelName {
 
 impl ModelName {
     /// All models, and `auto`.
-    pub const ALL: [Self; 5] = [Self::Standard, Self::Better, Self::Normalised, Self::Slab, Self::Auto];
+    pub const ALL: [Self; 7] =
+        [Self::Standard, Self::Better, Self::Directional, Self::Beam, Self::Normalised, Self::Slab, Self::Auto];
 
     /// The name in scene files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Standard => "standard",
             Self::Better => "better",
+            Self::Directional => "directional",
+            Self::Beam => "beam",
             Self::Normalised => "normalised",
             Self::Slab => "slab",
             Self::Auto => "auto",
@@ -128,6 +151,10 @@ pub enum Model {
     Standard(StandardDipole),
     /// See [`BetterDipole`].
     Better(BetterDipole),
+    /// See [`DirectionalDipole`].
+    Directional(DirectionalDipole),
+    /// See [`PhotonBeamDiffusion`].
+    Beam(PhotonBeamDiffusion),
     /// See [`NormalisedDiffusion`].
     Normalised(NormalisedDiffusion),
     /// See [`Slab`].
@@ -152,6 +179,10 @@ impl Model {
         match name {
             ModelName::Standard | ModelName::Slab => Self::Standard(StandardDipole::new(medium, exit_normalisation)),
             ModelName::Better => Self::Better(BetterDipole::new(medium, exit_normalisation)),
+            ModelName::Directional => Self::Directional(DirectionalDipole::new(medium, false)),
+            ModelName::Beam => {
+                Self::Beam(PhotonBeamDiffusion::new(medium, exit_normalisation, KappaExtinction::default()))
+            }
             ModelName::Normalised => Self::Normalised(NormalisedDiffusion::new(medium, exit_normalisation)),
             // `choose` never answers `Auto`.
             ModelName::Auto => Self::new(choose(medium, None).name, medium, exit_normalisation),
@@ -199,6 +230,8 @@ impl Model {
         match self {
             Self::Standard(_) => ModelName::Standard,
             Self::Better(_) => ModelName::Better,
+            Self::Directional(_) => ModelName::Directional,
+            Self::Beam(_) => ModelName::Beam,
             Self::Normalised(_) => ModelName::Normalised,
             Self::Slab(_) => ModelName::Slab,
         }
@@ -211,6 +244,7 @@ impl Model {
             Self::Better(model) => Some(model),
             Self::Normalised(model) => Some(model),
             Self::Slab(model) => Some(&**model),
+            Self::Directional(_) | Self::Beam(_) => None,
         }
     }
 
@@ -220,7 +254,7 @@ impl Model {
             Self::Standard(model) => Some(model),
             Self::Better(model) => Some(model),
             Self::Normalised(model) => Some(model),
-            Self::Slab(_) => None,
+            Self::Slab(_) | Self::Directional(_) | Self::Beam(_) => None,
         }
     }
 
@@ -229,6 +263,8 @@ impl Model {
         match self {
             Self::Standard(model) => visitor.visit(model),
             Self::Better(model) => visitor.visit(model),
+            Self::Directional(model) => visitor.visit(model),
+            Self::Beam(model) => visitor.visit(model),
             Self::Normalised(model) => visitor.visit(model),
             Self::Slab(model) => visitor.visit(&**model),
         }
