@@ -1,16 +1,16 @@
 //! Photon beam diffusion: a source extended along the refracted ray.
 
+use super::beam_gather::SourceKernel;
 use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::depth::DepthLaw;
 use super::exponential::{exp, exp_m1};
-use super::quadrature::{gauss_legendre, integrate};
-use super::{Bssrdf, Entry, Exit};
-use crate::math::{DVec3, Rgb};
+use super::{Bssrdf, Claims, Entry, Exit};
+use crate::math::{DVec3, GaussLegendre, Rgb};
 use crate::optics::Medium;
-use std::f64::consts::PI;
+use std::f64::consts::{LOG2_E, PI};
 use std::sync::LazyLock;
 
-static RULE: LazyLock<[(f64, f64); 32]> = LazyLock::new(gauss_legendre::<32>);
+static RULE: LazyLock<GaussLegendre> = LazyLock::new(|| GaussLegendre::new(32));
 
 /// Exponential range of the depth integral: what lies further below its largest value than e^-25 is left out.
 const RANGE: f64 = 25.0;
@@ -204,7 +204,7 @@ impl BeamChannel {
                 // Between, the distance is μ t and the integrand smooth in t; it falls as exp(-(1 + s μ) t).
                 let (begin, end) = (begin.clamp(from, to), end.clamp(from, to));
                 let seen = end.min(begin + RANGE / (1.0 + s * ray.mu));
-                let between = integrate(&*RULE, begin, seen, |t| self.along(&ray, t, 0.0));
+                let between = RULE.integrate(begin, seen, |t| self.along(&ray, t, 0.0));
                 self.panels(&ray, from, begin) + between + self.panels(&ray, end, to)
             }
         };
@@ -235,11 +235,11 @@ impl BeamChannel {
         for (share, closeness) in [(0.5, 0.25), (0.875, 0.06), (1.0, f64::INFINITY)] {
             let end = v_of(share * near);
             if rho < closeness * near && end > start + 0.5 && end < last {
-                sum += integrate(&*RULE, start, end, along);
+                sum += RULE.integrate(start, end, along);
                 start = end;
             }
         }
-        sum + if last > start { integrate(&*RULE, start, last, along) } else { 0.0 }
+        sum + if last > start { RULE.integrate(start, last, along) } else { 0.0 }
     }
 
     /// The part of t ≥ 0 where t + s √((t - near)² + ρ²) is at most `most`, about its least point.
@@ -268,7 +268,7 @@ impl BeamChannel {
         if self.exitance_scale == 0.0 {
             return 0.0;
         }
-        let rule = gauss_legendre::<12>();
+        let rule = GaussLegendre::new(12);
         let unit = 1.0 / self.sigma_t_prime;
         let (first, last) = (1e-5_f64.ln(), (50.0 / self.s.clamp(1e-5, 1.0)).ln());
         let panels = 20;
@@ -276,7 +276,7 @@ impl BeamChannel {
         (0..panels)
             .map(|i| {
                 let a = first + width * f64::from(i);
-                integrate(&rule, a, a + width, |y| {
+                rule.integrate(a, a + width, |y| {
                     let r = unit * y.exp();
                     2.0 * PI * r * r * self.integral(&Pair { r, rho: r, x_w: 0.0, mu: 1.0 }, 0.0)
                 })
@@ -308,6 +308,26 @@ impl PhotonBeamDiffusion {
         let depths = DepthLaw::new(channels.map(|k| if k.exitance_scale > 0.0 { k.sigma_t_prime } else { 0.0 }));
         let decay = channels.iter().map(|k| k.s.min(1.0) * k.sigma_t_prime).fold(f64::INFINITY, f64::min);
         Self { channels, totals, depths, grey, decay: decay as f32 }
+    }
+
+    /// The channels for vectorised sums, in f32.
+    pub(super) fn source_kernels(&self) -> [SourceKernel; 3] {
+        self.channels.map(|k| SourceKernel {
+            sigma: k.sigma_t_prime as f32,
+            sigma_squared: to_finite(k.sigma_t_prime * k.sigma_t_prime),
+            s: k.s as f32,
+            s_log2: (LOG2_E * k.s) as f32,
+            h: k.h as f32,
+            c_phi_over_d: k.c_phi_over_d as f32,
+            c_e: k.c_e as f32,
+            kappa_log2: (LOG2_E * k.kappa) as f32,
+            scale: to_finite(k.exitance_scale * k.radiance),
+        })
+    }
+
+    /// True where the three channels do not differ.
+    pub(super) fn is_grey(&self) -> bool {
+        self.grey
     }
 
     /// How depths are drawn, one for the three channels.
@@ -355,6 +375,10 @@ impl Bssrdf for PhotonBeamDiffusion {
     /// The least of min(s, σ_t′): along the ray light decays as exp(-σ_t′ t), which for α′ below 0.5 is slower.
     fn decay(&self) -> f32 {
         self.decay
+    }
+
+    fn claims(&self) -> Claims {
+        Claims { first_order: false, reciprocal: false, bounded_energy: false }
     }
 
     /// Orders 2 and higher over a plane at normal incidence.

@@ -2,10 +2,9 @@
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::exponential::{exp, exp_m1};
-use super::quadrature::{gauss_legendre, integrate};
 use super::true_albedo::half_space_albedo;
 use super::{Bssrdf, Claims, Entry, Exit};
-use crate::math::{DVec3, Rgb};
+use crate::math::{DVec3, GaussLegendre, Rgb};
 use crate::optics::Medium;
 use std::f64::consts::PI;
 
@@ -67,7 +66,7 @@ pub struct DirectionalChannel {
 
 /// The scalars by which a pair of points enters the kernel, shared by the channels. Lengths in scene units.
 #[derive(Clone, Copy)]
-struct Pair {
+pub(super) struct Pair {
     r: f64,
     /// |x × w|.
     rho: f64,
@@ -84,10 +83,12 @@ struct Pair {
 impl Pair {
     /// From x = x_o - x_i, the outward normal of the entry, the refracted direction and the outward normal of the
     /// exit. Normals need not be of unit length.
-    fn new(x: DVec3, n_i: DVec3, w: DVec3, n_o: DVec3) -> Self {
-        let star = modified_normal(x, n_i);
+    #[inline(always)]
+    pub(super) fn new(x: DVec3, n_i: DVec3, w: DVec3, n_o: DVec3) -> Self {
+        let r = x.length();
+        let star = modified_normal(x, r, n_i);
         Self {
-            r: x.length(),
+            r,
             rho: x.cross(w).length(),
             x_w: x.dot(w),
             x_n: x.dot(n_o),
@@ -96,18 +97,35 @@ impl Pair {
             n_star: star.dot(n_o),
         }
     }
+
+    /// The scalars in order, for vectorised loops.
+    #[inline(always)]
+    pub(super) fn columns(&self) -> [f64; 7] {
+        [self.r, self.rho, self.x_w, self.x_n, self.mu_0, self.w_star, self.n_star]
+    }
+
+    /// The inverse of [`Self::columns`].
+    #[inline(always)]
+    pub(super) fn from_columns([r, rho, x_w, x_n, mu_0, w_star, n_star]: [f64; 7]) -> Self {
+        Self { r, rho, x_w, x_n, mu_0, w_star, n_star }
+    }
 }
 
 /// n*: `n` made orthogonal to `x`, normalised; `n` itself where `x` is 0. From the double cross product, because
 /// subtracting the component along `x` loses all digits where the two are nearly parallel. Where they are parallel
 /// every orthogonal direction is as good, and one is taken that depends on `x` alone.
-fn modified_normal(x: DVec3, n: DVec3) -> DVec3 {
-    let Some(along) = x.try_normalize() else { return n };
+///
+/// Straight-line code with choices by value, as all of the kernel, so that loops over pairs vectorise.
+#[inline(always)]
+fn modified_normal(x: DVec3, r: f64, n: DVec3) -> DVec3 {
+    let along = x * if r > 0.0 { 1.0 / r } else { 0.0 };
     let side = n.cross(along);
-    if side.length_squared() > 1e-28 {
-        return along.cross(side).normalize();
-    }
-    along.any_orthonormal_vector()
+    let axis = if along.x.abs() < 0.8 { DVec3::X } else { DVec3::Y };
+    let other = along.cross(axis);
+    let parallel = side.length_squared() <= 1e-28;
+    let side = if parallel { other } else { side };
+    let star = along.cross(side) * (1.0 / side.length());
+    if r > 0.0 { star } else { n }
 }
 
 impl DirectionalChannel {
@@ -150,26 +168,17 @@ impl DirectionalChannel {
     ///   1/d_r - q/d_v             = (u - m) / d_v
     ///   k_r/d_r³ - q k_v/d_v³     = [k_r (u (1 + v + v²) - m) - q s t] / d_v³,                 k = 1 + s d
     ///   j_r/d_r⁵ - q j_v/d_v⁵     = [j_r (u (1 + v + v² + v³ + v⁴) - m) - q (j_v - j_r)] / d_v⁵,  j = 3 k + (s d)²
-    #[inline]
-    fn kernel(&self, pair: &Pair, gain: f64) -> f64 {
-        if self.scale == 0.0 {
-            return 0.0;
-        }
+    #[inline(always)]
+    pub(super) fn kernel(&self, pair: &Pair, gain: f64) -> f64 {
         let (s, h, length) = (self.s, self.h, self.sigma_t_prime);
         let (r, rho, x_w, x_n) = (pair.r * length, pair.rho * length, pair.x_w * length, pair.x_n * length);
         let r2 = r * r;
-        let beyond = if pair.mu_0 > 0.0 {
-            // D = 1/3; rho / sqrt(r² + d_e²) is -cos b.
-            let lift = pair.mu_0 / 3.0;
-            lift * (lift + 2.0 * self.d_e * rho / (r2 + self.d_e * self.d_e).sqrt())
-        } else {
-            self.back2
-        };
+        // D = 1/3; rho / sqrt(r² + d_e²) is -cos b.
+        let lift = pair.mu_0 / 3.0;
+        let facing = lift * (lift + 2.0 * self.d_e * rho / (r2 + self.d_e * self.d_e).sqrt());
+        // An exit at right angles to the ray at r = 0 would be at no distance.
+        let beyond = if pair.mu_0 > 0.0 { facing } else { self.back2 }.max(1e-80);
         let (d_r, d_v) = ((r2 + beyond).sqrt(), (r2 + h * h).sqrt());
-        let exponent = gain - s * d_r;
-        if exponent < -700.0 {
-            return 0.0;
-        }
         let t = (h * h - beyond) / (d_v + d_r);
         let m = exp_m1(-s * t);
         let q = 1.0 + m;
@@ -191,7 +200,7 @@ impl DirectionalChannel {
         let sum = 3.0 * c_phi * first
             + (p * third - p_more * q * k_v * over3)
             + (o * fifth - o_more * q * j_v * over3 * over * over);
-        self.scale * sum * exp(exponent)
+        self.scale * sum * exp(gain - s * d_r)
     }
 
     /// Exitance over the plane, normal incidence, per entered flux, of the clamped model.
@@ -199,7 +208,7 @@ impl DirectionalChannel {
         if self.scale == 0.0 {
             return 0.0;
         }
-        let rule = gauss_legendre::<16>();
+        let rule = GaussLegendre::new(16);
         let unit = 1.0 / self.sigma_t_prime;
         // r = e^y in units of the mean free path; beyond r = 1e6 or 50/s nothing is left. The end of the
         // logarithmic axis at 1e-5 drops r²: 1e-10.
@@ -209,7 +218,7 @@ impl DirectionalChannel {
         let sum: f64 = (0..panels)
             .map(|i| {
                 let a = first + width * f64::from(i);
-                integrate(&rule, a, a + width, |y| {
+                rule.integrate(a, a + width, |y| {
                     let r = unit * y.exp();
                     let pair = Pair { r, rho: r, x_w: 0.0, x_n: 0.0, mu_0: 1.0, w_star: -1.0, n_star: 1.0 };
                     2.0 * PI * r * r * self.kernel(&pair, 0.0).max(0.0)
@@ -254,6 +263,11 @@ impl DirectionalDipole {
         Self { channels, totals, extinction, grey, decay: decay as f32 }
     }
 
+    /// The channels, and whether they are the same.
+    pub(super) fn channels(&self) -> (&[DirectionalChannel; 3], bool) {
+        (&self.channels, self.grey)
+    }
+
     /// Delta-Eddington extinction σ_s (1 - g²) + σ_a [1/unit] of the reduced-intensity part S_dE of [FHK14]: the
     /// light that is refracted in, attenuated by exp(-extinction · length) along a straight path, and refracted
     /// out. It is a specular path of the renderer, multiplied by that factor, and no part of [`Bssrdf::eval`].
@@ -278,12 +292,12 @@ impl Bssrdf for DirectionalDipole {
         self.decay
     }
 
+    fn claims(&self) -> Claims {
+        Claims { first_order: true, reciprocal: false, bounded_energy: false }
+    }
+
     /// Total over a plane at normal incidence; above 1 for weak absorption unless calibrated.
     fn total(&self) -> Rgb {
         Rgb::from_fn(|c| self.totals[c] as f32)
-    }
-
-    fn claims(&self) -> Claims {
-        Claims { first_order: true, reciprocal: false, bounded_energy: false }
     }
 }

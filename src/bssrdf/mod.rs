@@ -4,14 +4,15 @@
 
 mod auto;
 mod beam;
+mod beam_gather;
 mod better;
 mod channel;
 mod depth;
 mod directional;
+mod directional_gather;
 mod exponential;
 mod multipole;
 mod normalised;
-mod quadrature;
 mod radial;
 mod single;
 mod slab;
@@ -23,10 +24,12 @@ use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
 pub use auto::{Choice, choose};
 pub use beam::{BeamChannel, KappaExtinction, PhotonBeamDiffusion};
+pub use beam_gather::SourceColumns;
 pub use better::BetterDipole;
 pub use channel::ChannelMedium;
 pub use depth::DepthLaw;
 pub use directional::{DirectionalChannel, DirectionalDipole};
+pub use directional_gather::DirectionColumns;
 pub use normalised::{NormalisedDiffusion, WidthFit};
 pub use radial::{EntryColumns, Gather, Radial};
 pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
@@ -122,11 +125,11 @@ impl ModelName {
         match self {
             Self::Standard => "standard",
             Self::Better => "better",
+            Self::Directional => "directional",
+            Self::Beam => "beam",
             Self::Normalised => "normalised",
             Self::Slab => "slab",
             Self::Auto => "auto",
-            Self::Directional => "directional",
-            Self::Beam => "beam",
         }
     }
 }
@@ -148,14 +151,14 @@ pub enum Model {
     Standard(StandardDipole),
     /// See [`BetterDipole`].
     Better(BetterDipole),
-    /// See [`NormalisedDiffusion`].
-    Normalised(NormalisedDiffusion),
-    /// See [`Slab`].
-    Slab(Box<Slab>),
     /// See [`DirectionalDipole`].
     Directional(DirectionalDipole),
     /// See [`PhotonBeamDiffusion`].
     Beam(PhotonBeamDiffusion),
+    /// See [`NormalisedDiffusion`].
+    Normalised(NormalisedDiffusion),
+    /// See [`Slab`].
+    Slab(Box<Slab>),
 }
 
 /// Generic work over whichever model is there.
@@ -176,11 +179,11 @@ impl Model {
         match name {
             ModelName::Standard | ModelName::Slab => Self::Standard(StandardDipole::new(medium, exit_normalisation)),
             ModelName::Better => Self::Better(BetterDipole::new(medium, exit_normalisation)),
-            ModelName::Normalised => Self::Normalised(NormalisedDiffusion::new(medium, exit_normalisation)),
             ModelName::Directional => Self::Directional(DirectionalDipole::new(medium, false)),
             ModelName::Beam => {
                 Self::Beam(PhotonBeamDiffusion::new(medium, exit_normalisation, KappaExtinction::default()))
             }
+            ModelName::Normalised => Self::Normalised(NormalisedDiffusion::new(medium, exit_normalisation)),
             // `choose` never answers `Auto`.
             ModelName::Auto => Self::new(choose(medium, None).name, medium, exit_normalisation),
         }
@@ -227,9 +230,9 @@ impl Model {
         match self {
             Self::Standard(_) => ModelName::Standard,
             Self::Better(_) => ModelName::Better,
-            Self::Normalised(_) => ModelName::Normalised,
             Self::Directional(_) => ModelName::Directional,
             Self::Beam(_) => ModelName::Beam,
+            Self::Normalised(_) => ModelName::Normalised,
             Self::Slab(_) => ModelName::Slab,
         }
     }
@@ -260,10 +263,10 @@ impl Model {
         match self {
             Self::Standard(model) => visitor.visit(model),
             Self::Better(model) => visitor.visit(model),
-            Self::Normalised(model) => visitor.visit(model),
-            Self::Slab(model) => visitor.visit(&**model),
             Self::Directional(model) => visitor.visit(model),
             Self::Beam(model) => visitor.visit(model),
+            Self::Normalised(model) => visitor.visit(model),
+            Self::Slab(model) => visitor.visit(&**model),
         }
     }
 }

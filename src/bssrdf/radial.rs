@@ -240,7 +240,7 @@ impl<C: Formula> Kernel for Batch<'_, C> {
 /// Entries handled between two visits to memory; a multiple of the lanes of the sum.
 pub(super) const BLOCK: usize = 64;
 /// Lanes of the sum, whatever the instruction set.
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 
 struct Sum<'a, C> {
     channels: &'a [C; 3],
@@ -275,7 +275,7 @@ impl<C: Formula> Kernel for Sum<'_, C> {
 }
 
 #[inline(always)]
-fn add(lanes: &mut [f64; LANES], s: &[f32; BLOCK], weight: &[f32; BLOCK]) {
+pub(super) fn add(lanes: &mut [f64; LANES], s: &[f32; BLOCK], weight: &[f32; BLOCK]) {
     for (s, w) in s.chunks_exact(LANES).zip(weight.chunks_exact(LANES)) {
         for ((lane, s), w) in lanes.iter_mut().zip(s).zip(w) {
             *lane += f64::from(s * w);

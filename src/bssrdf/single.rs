@@ -2,21 +2,13 @@
 
 use super::channel::{ChannelMedium, to_finite};
 use super::depth::DepthLaw;
-use super::quadrature::{gauss_legendre, integrate};
-use crate::math::{DVec3, Rgb, Vec3};
-use crate::optics::{Medium, refract, transmittance};
+use crate::math::{DVec3, GaussLegendre, Rgb, Vec3};
+use crate::optics::{HenyeyGreenstein, Medium, refract, transmittance};
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-static COARSE: LazyLock<[(f64, f64); 16]> = LazyLock::new(gauss_legendre::<16>);
-static FINE: LazyLock<[(f64, f64); 32]> = LazyLock::new(gauss_legendre::<32>);
-
-/// Henyey-Greenstein phase function [1/sr] from 1 - cos and 1 + cos of the angle between the directions of
-/// propagation before and after; the two keep their digits where `g` nears 1 or -1.
-fn henyey_greenstein(g: f64, less: f64, more: f64) -> f64 {
-    let d = if g >= 0.0 { (1.0 - g).powi(2) + 2.0 * g * less } else { (1.0 + g).powi(2) - 2.0 * g * more };
-    (1.0 - g) * (1.0 + g) / (4.0 * PI * d * d.sqrt())
-}
+static COARSE: LazyLock<GaussLegendre> = LazyLock::new(|| GaussLegendre::new(16));
+static FINE: LazyLock<GaussLegendre> = LazyLock::new(|| GaussLegendre::new(32));
 
 /// Fresnel transmittance from inside to outside at inner cosine `mu`, in f64.
 fn transmitted_out(eta: f64, mu: f64) -> f64 {
@@ -85,6 +77,7 @@ impl SingleChannel {
         }
         let first = ((start - near) / rho).asinh();
         let least = near + rho * first.exp();
+        let phase = HenyeyGreenstein { g };
         if least > 700.0 {
             return 0.0;
         }
@@ -93,17 +86,17 @@ impl SingleChannel {
             let cosh = 0.5 * (e + e_inverse);
             let mu = (mu_in * (near / rho + 0.5 * (e - e_inverse)) / cosh).min(1.0);
             let (more, less) = (e_inverse / cosh, e / cosh);
-            (least - near - rho * e).exp() * henyey_greenstein(g, less, more) * mu * transmitted_out(eta, mu) / cosh
+            (least - near - rho * e).exp() * phase.value(0.5 * (more - less)) * mu * transmitted_out(eta, mu) / cosh
         };
         // 40 powers of e below the start nothing counts, nor where 1/cosh has fallen by as much.
         let last = (first + (40.0 / (rho * first.exp())).ln_1p()).min(first.max(0.0) + 40.0);
         let bend = last.min(first + 1.0);
-        let mut sum = integrate(&*FINE, 0.0, (bend - first).sqrt(), |y| 2.0 * y * along(first + y * y));
+        let mut sum = FINE.integrate(0.0, (bend - first).sqrt(), |y| 2.0 * y * along(first + y * y));
         let panels = ((last - bend) / 2.0).ceil();
         let width = (last - bend) / panels.max(1.0);
         for i in 0..panels as u32 {
             let a = bend + width * f64::from(i);
-            sum += integrate(&*COARSE, a, a + width, along);
+            sum += COARSE.integrate(a, a + width, along);
         }
         sigma_s * sigma_t * sum * (-least).exp() / rho
     }
@@ -116,9 +109,9 @@ impl SingleChannel {
             return 0.0;
         }
         let critical = critical_cosine(eta);
-        let integral = integrate(&*FINE, 0.0, (1.0 - critical).sqrt(), |y| {
+        let integral = FINE.integrate(0.0, (1.0 - critical).sqrt(), |y| {
             let mu = critical + y * y;
-            let p = henyey_greenstein(g, 1.0 + mu, 1.0 - mu);
+            let p = HenyeyGreenstein { g }.value(-mu);
             2.0 * y * p * transmitted_out(eta, mu) * mu / (1.0 + mu)
         });
         2.0 * PI * sigma_s / self.medium.sigma_t() * integral
@@ -222,8 +215,7 @@ impl SingleScattering {
         let cos = f64::from(-inside.dot(w_inside)).clamp(-1.0, 1.0);
         let ratio = f64::from(mu) / mu_inside;
         let refracted = f64::from(light.distance) * ratio;
-        let common =
-            henyey_greenstein(g, 1.0 - cos, 1.0 + cos) * f64::from(transmittance(eta as f32, mu)) * ratio / (eta * eta);
+        let common = HenyeyGreenstein { g }.value(cos) * f64::from(transmittance(eta as f32, mu)) * ratio / (eta * eta);
         Rgb::from_fn(|c| to_finite(common * attenuated(&self.media[c], refracted)))
     }
 
@@ -242,7 +234,7 @@ impl SingleScattering {
         let cos = f64::from(-a.dot(b)).clamp(-1.0, 1.0);
         let depth = -f64::from(a.dot(n) + b.dot(n));
         let boundary = f64::from(transmittance(eta_f32, mu_i) * transmittance(eta_f32, mu_o)) / (eta * eta);
-        let common = boundary * henyey_greenstein(g, 1.0 - cos, 1.0 + cos) / depth;
+        let common = boundary * HenyeyGreenstein { g }.value(cos) / depth;
         Rgb::from_fn(|c| {
             let m = &self.media[c];
             if m.sigma_s > 0.0 { to_finite(m.sigma_s / m.sigma_t() * common) } else { 0.0 }

@@ -1,6 +1,6 @@
 //! The exact diffuse reflectance of a half space of isotropic scatterers behind a smooth boundary.
 
-use super::quadrature::gauss_legendre;
+use crate::math::GaussLegendre;
 use std::f64::consts::PI;
 
 const PER_PANEL: usize = 24;
@@ -46,11 +46,11 @@ pub(super) fn half_space_albedo(alpha: f64, eta: f64) -> f64 {
 /// Nodes and weights over the inner cosine, split at the critical angle; denser towards the split and towards 0,
 /// where the integrands have roots.
 fn split_nodes(eta: f64) -> [(f64, f64); NODES] {
-    let rule = gauss_legendre::<PER_PANEL>();
+    let rule = GaussLegendre::new(PER_PANEL);
     let critical = if eta > 1.0 { (1.0 - 1.0 / (eta * eta)).sqrt() } else { 0.0 };
     let split = if critical > 0.0 { critical } else { 0.25 };
     std::array::from_fn(|i| {
-        let (x, w) = rule[i % PER_PANEL];
+        let (x, w) = rule.points()[i % PER_PANEL];
         let (s, ds) = (0.5 * (x + 1.0), 0.5 * w);
         if i < PER_PANEL {
             (split * s * s, split * 2.0 * s * ds)

@@ -19,6 +19,11 @@ impl GaussLegendre {
         self.points.iter().map(move |&(x, w)| (middle + half * x, half * w))
     }
 
+    /// Nodes on [-1, 1] with their weights.
+    pub fn points(&self) -> &[(f64, f64)] {
+        &self.points
+    }
+
     /// ∫ f over [a, b].
     pub fn integrate(&self, a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
         let (middle, half) = (0.5 * (a + b), 0.5 * (b - a));

@@ -1,0 +1,151 @@
+//! Vectorised sums of the directional dipole over many cached entries.
+
+use super::directional::{DirectionalChannel, DirectionalDipole, Pair};
+use super::{EntryColumns, radial::LANES};
+use crate::math::{DVec3, Kernel, Level, Vec3, dispatch_at};
+
+/// Entries handled between two visits to memory.
+const BLOCK: usize = LANES;
+
+/// Normals and refracted directions of [`EntryColumns`], in columns of the same length.
+#[derive(Clone, Copy, Debug)]
+pub struct DirectionColumns<'a> {
+    /// x, y, z of the outward normals.
+    pub n: [&'a [f32]; 3],
+    /// x, y, z of the refracted directions, pointing into the medium.
+    pub w: [&'a [f32]; 3],
+}
+
+struct Sum<'a> {
+    channels: &'a [DirectionalChannel; 3],
+    grey: bool,
+    at: DVec3,
+    n_o: DVec3,
+    entries: EntryColumns<'a>,
+    directions: DirectionColumns<'a>,
+}
+
+impl Kernel for Sum<'_> {
+    type Out = [f64; 3];
+
+    #[inline(always)]
+    fn run(self) -> [f64; 3] {
+        let (e, d) = (&self.entries, &self.directions);
+        let columns = [e.x, e.y, e.z, d.n[0], d.n[1], d.n[2], d.w[0], d.w[1], d.w[2]];
+        let count = columns.iter().chain(&e.weight).map(|c| c.len()).min().unwrap_or(0);
+        let mut lanes = [[0.0_f64; BLOCK]; 3];
+        let mut start = 0;
+        while start < count {
+            // Past the end, entries like none: of weight 0, at a distance from the exit.
+            let x = [(e.x, self.at.x), (e.y, self.at.y), (e.z, self.at.z)]
+                .map(|(column, at)| block(column, start, count, at as f32 + 1.0));
+            let n = d.n.map(|column| block(column, start, count, 1.0));
+            let w = d.w.map(|column| block(column, start, count, -1.0));
+            let weight = e.weight.map(|column| block(column, start, count, 0.0));
+            let mut pairs = [[0.0_f64; BLOCK]; 7];
+            for i in 0..BLOCK {
+                let vector = |v: &[[f32; BLOCK]; 3]| DVec3::new(v[0][i].into(), v[1][i].into(), v[2][i].into());
+                let pair = Pair::new(self.at - vector(&x), vector(&n), vector(&w), self.n_o).columns();
+                for (column, value) in pairs.iter_mut().zip(pair) {
+                    column[i] = value;
+                }
+            }
+            let mut s = [0.0_f64; BLOCK];
+            for c in 0..3 {
+                if c == 0 || !self.grey {
+                    let channel = self.channels[c];
+                    for (i, s) in s.iter_mut().enumerate() {
+                        let value = channel.kernel(&Pair::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
+                        // Neither the clamp nor this lets a NaN through.
+                        *s = if value > 0.0 { value.min(f64::from(f32::MAX)) } else { 0.0 };
+                    }
+                }
+                for ((lane, s), &weight) in lanes[c].iter_mut().zip(&s).zip(&weight[c]) {
+                    *lane += s * f64::from(weight);
+                }
+            }
+            start += BLOCK;
+        }
+        lanes.map(|l| l.iter().sum())
+    }
+}
+
+#[inline(always)]
+fn block(column: &[f32], start: usize, count: usize, fill: f32) -> [f32; BLOCK] {
+    let rest = &column[start..count];
+    if let Some(full) = rest.first_chunk::<BLOCK>() {
+        return *full;
+    }
+    let mut padded = [fill; BLOCK];
+    padded[..rest.len()].copy_from_slice(rest);
+    padded
+}
+
+impl DirectionalDipole {
+    /// Σ weight_i · S_d(entry i, exit) per channel to an exit at `at` with outward normal `n_o`, by the code that gives
+    /// [`super::Bssrdf::eval`], summed in a fixed order: the bits do not depend on `level`.
+    pub fn gather_at(
+        &self,
+        level: Level,
+        at: Vec3,
+        n_o: Vec3,
+        entries: EntryColumns<'_>,
+        directions: DirectionColumns<'_>,
+    ) -> [f64; 3] {
+        let (channels, grey) = self.channels();
+        dispatch_at(level, Sum { channels, grey, at: at.as_dvec3(), n_o: n_o.as_dvec3(), entries, directions })
+    }
+
+    /// [`Self::gather_at`] with the widest instruction set of this machine.
+    pub fn gather(&self, at: Vec3, n_o: Vec3, entries: EntryColumns<'_>, directions: DirectionColumns<'_>) -> [f64; 3] {
+        self.gather_at(Level::best(), at, n_o, entries, directions)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Bssrdf, Entry, Exit};
+    use super::*;
+    use crate::math::{Rgb, hash, unit_f32};
+    use crate::optics::Medium;
+
+    #[test]
+    fn the_sum_is_the_sum_of_single_evaluations_to_the_bits_of_every_instruction_set() {
+        let (s, a) = ([0.74, 0.88, 1.01], [0.032, 0.17, 0.48]);
+        for (s, a) in [(s, a), ([1.0; 3], [0.0; 3]), ([0.9, 0.0, 30.0], [0.1, 1.0, 0.0])] {
+            let model = DirectionalDipole::new(&Medium { sigma_s: Rgb(s), sigma_a: Rgb(a), g: 0.0, eta: 1.3 }, false);
+            for count in [1_u64, 15, 16, 1000] {
+                let mut columns: [Vec<f32>; 12] = Default::default();
+                let (at, n_o) = (Vec3::new(0.3, -0.2, 1.0), Vec3::new(0.6, 0.0, 0.8));
+                let mut expected = [0.0; 3];
+                for i in 0..count {
+                    let u = |k: u64| unit_f32((hash(16 * i + k) >> 32) as u32) - 0.5;
+                    let entry = Entry {
+                        x: if i % 50 == 7 { at } else { Vec3::new(9.0 * u(0), 9.0 * u(1), 3.0 * u(2)) },
+                        n: Vec3::new(u(3), u(4), 1.0).normalize(),
+                        w: Vec3::new(u(5), u(6), -1.0).normalize(),
+                    };
+                    let value = model.eval(&entry, &Exit { x: at, n: n_o, w: n_o });
+                    let weight = [1.0, u(7) + 0.5, 2.0];
+                    let row = [entry.x, entry.n, entry.w].map(|v| v.to_array()).concat();
+                    for (column, value) in columns.iter_mut().zip(row.into_iter().chain(weight)) {
+                        column.push(value);
+                    }
+                    for c in 0..3 {
+                        expected[c] += f64::from(value[c]) * f64::from(weight[c]);
+                    }
+                }
+                let [x, y, z, n0, n1, n2, w0, w1, w2, r, g, b] = columns.each_ref().map(Vec::as_slice);
+                let entries = EntryColumns { x, y, z, weight: [r, g, b] };
+                let directions = DirectionColumns { n: [n0, n1, n2], w: [w0, w1, w2] };
+                let sum = model.gather_at(Level::Baseline, at, n_o, entries, directions);
+                for c in 0..3 {
+                    assert!((sum[c] - expected[c]).abs() <= 1e-6 * expected[c], "{count}: {sum:?} {expected:?}");
+                }
+                for level in Level::available() {
+                    assert_eq!(model.gather_at(level, at, n_o, entries, directions), sum, "{level:?}");
+                }
+            }
+        }
+    }
+}
