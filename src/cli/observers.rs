@@ -59,10 +59,10 @@ impl Observer for ProgressDisplay {
         let done = fraction_done(progress);
         let passes = progress.film.passes();
         let elapsed = progress.seconds.total();
+        let left = elapsed * (1.0 / done.max(1e-9) - 1.0);
         match self {
             Self::Silent => {}
             Self::Bar(bar) => {
-                let left = elapsed * (1.0 / done.max(1e-9) - 1.0);
                 bar.set_position((done * 1000.0) as u64);
                 bar.set_message(format!("pass {passes}, {} elapsed, {} left", clock(elapsed), clock(left)));
             }
@@ -70,7 +70,7 @@ impl Observer for ProgressDisplay {
                 let tenth = (done * 10.0) as u32;
                 if tenth > *told {
                     *told = tenth;
-                    eprintln!("{:3} % pass {passes}, {elapsed:.1} s", tenth * 10);
+                    eprintln!("{:3} % pass {passes}, {} elapsed, {} left", tenth * 10, clock(elapsed), clock(left));
                 }
             }
         }

@@ -3,6 +3,7 @@
 use super::INTERRUPTED;
 use super::observers::{ProgressDisplay, Records, Verbosity, error_figures};
 use super::setup::{Method, MethodArgs, prepare};
+use super::stats::{self, Stats};
 use marmor::film::{Attribute, Film, Image, Metadata, PngOptions, Window, check_writable, save, source_date_epoch};
 use marmor::integrator::{Integrator, View};
 use marmor::query;
@@ -100,7 +101,14 @@ pub fn run(args: Args) -> Result<ExitCode> {
             time: args.time,
             cancel: &cancel,
         };
-        let mut task = Task { args: &args, verbosity, begin, reference, description: rays.description() };
+        let mut task = Task {
+            args: &args,
+            verbosity,
+            begin,
+            reference,
+            description: rays.description(),
+            effective: prepared.file.effective(),
+        };
         if verbosity > Verbosity::Quiet {
             let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles.len()).sum();
             eprintln!(
@@ -145,6 +153,7 @@ struct Task<'a> {
     begin: Instant,
     reference: Option<Image>,
     description: String,
+    effective: String,
 }
 
 impl Task<'_> {
@@ -170,7 +179,16 @@ impl Task<'_> {
         let outcome = render::run(method, view, job, film, &mut observers)?;
         display.finish();
         if let Some(path) = &self.args.stats {
-            super::stats::write(path, view.scene, &self.description, seconds_setup, &parts, &outcome, film)?;
+            let stats = Stats {
+                effective: &self.effective,
+                scene: view.scene,
+                backend: &self.description,
+                seconds_setup,
+                parts: &parts,
+                outcome: &outcome,
+                film,
+            };
+            stats::write(path, &stats)?;
         }
         Ok(outcome)
     }

@@ -8,22 +8,28 @@ use marmor::{Error, Result};
 use serde_json::json;
 use std::path::Path;
 
+/// What is known when a render has ended.
+pub struct Stats<'a> {
+    /// The scene file with all options folded in.
+    pub effective: &'a str,
+    pub scene: &'a Scene,
+    pub backend: &'a str,
+    pub seconds_setup: f64,
+    pub parts: &'a [Part],
+    pub outcome: &'a Outcome,
+    pub film: &'a Film,
+}
+
 /// Writes the statistics of a finished render.
-pub fn write(
-    path: &Path,
-    scene: &Scene,
-    backend: &str,
-    seconds_setup: f64,
-    parts: &[Part],
-    outcome: &Outcome,
-    film: &Film,
-) -> Result<()> {
+pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
+    let Stats { effective, scene, backend, seconds_setup, parts, outcome, film } = stats;
     let (seconds, tally) = (outcome.seconds, outcome.tally);
     let per_second = |count: u64, seconds: f64| if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
     let exits = tally.gather.exits.max(1) as f64;
     let stats = json!({
         "version": env!("CARGO_PKG_VERSION"),
         "scene": scene.name,
+        "effective_scene": effective,
         "backend": backend,
         "threads": rayon::current_num_threads(),
         "objects": scene.objects.iter().map(|o| json!({
