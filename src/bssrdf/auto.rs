@@ -76,7 +76,7 @@ mod tests {
         assert!(milk.trusted && milk.name == ModelName::Beam, "{milk:?}");
         let dark = choose(&medium(0.07, 0.97, 0.0), None);
         assert!(!dark.trusted && dark.why.contains("trace paths"), "{dark:?}");
-        let forward = choose(&medium(20.0, 0.2, 0.95), None);
+        let forward = choose(&medium(20.0, 2.0, 0.95), None);
         assert!(!forward.trusted && forward.why.contains("g 0.950"), "{forward:?}");
         let slab = choose(&medium(2.55, 0.0011, 0.0), Some(4.0));
         assert!(slab.trusted && slab.name == ModelName::Slab, "{slab:?}");
