@@ -3,7 +3,10 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)] // a bench prints, and its media are in range
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use marmor::bssrdf::{Bssrdf, Entry, EntryColumns, Exit, Model, ModelVisitor};
+use marmor::bssrdf::{
+    Bssrdf, DirectionColumns, DirectionalDipole, Entry, EntryColumns, Exit, KappaExtinction, Model, ModelVisitor,
+    PhotonBeamDiffusion, SourceColumns,
+};
 use marmor::math::{Level, Rgb, Vec3};
 use marmor::optics::Medium;
 use std::hint::black_box;
@@ -21,23 +24,63 @@ fn models() -> Vec<Model> {
     Model::all_for(&medium, true).unwrap()
 }
 
-/// Evaluations per second of `f`, which makes [`COUNT`] of them: the best of some runs.
+/// Evaluations per second of `f`, which makes [`COUNT`] of them: the best of twenty runs of some 5 ms.
 fn rate(mut f: impl FnMut()) -> f64 {
+    let start = Instant::now();
+    f();
+    let repeats = (5e-3 / start.elapsed().as_secs_f64().max(1e-9)).ceil().clamp(1.0, 10_000.0) as u32;
     let mut best = f64::INFINITY;
     for _ in 0..20 {
         let start = Instant::now();
-        for _ in 0..100 {
+        for _ in 0..repeats {
             f();
         }
         best = best.min(start.elapsed().as_secs_f64());
     }
-    100.0 * COUNT as f64 / best
+    f64::from(repeats) * COUNT as f64 / best
 }
 
 /// Whole milk, all channels.
-fn coloured() -> Vec<Model> {
-    let medium = Medium::reduced(Rgb([2.55, 3.21, 3.77]), Rgb([0.0011, 0.0024, 0.014]), 1.3).unwrap();
-    Model::all_for(&medium, true).unwrap()
+fn coloured() -> Medium {
+    Medium::reduced(Rgb([2.55, 3.21, 3.77]), Rgb([0.0011, 0.0024, 0.014]), 1.3).unwrap()
+}
+
+/// The sums that the cache makes, light refracted at 45 degrees: entries of the directional dipole, sources of `beam`
+/// with one depth each. A pair is a point of entry and its three channels.
+fn gathers(medium: &Medium, name: &str, r: &[f32]) {
+    let column = |v: f32| vec![v; COUNT];
+    let (zero, one, slant) = (column(0.0), column(1.0), column(std::f32::consts::FRAC_1_SQRT_2));
+    let down = column(-std::f32::consts::FRAC_1_SQRT_2);
+    let directional = DirectionalDipole::new(medium, false);
+    let entries = EntryColumns { x: r, y: &zero, z: &zero, weight: [&one; 3] };
+    let directions = DirectionColumns { n: [&zero, &zero, &one], w: [&slant, &zero, &down] };
+    let beam = PhotonBeamDiffusion::new(medium, true, KappaExtinction::default());
+    let w = Vec3::new(slant[0], 0.0, down[0]);
+    let t: Vec<f32> = (0..COUNT).map(|i| beam.sample_depth((i * 769 % COUNT) as f32 / COUNT as f32)).collect();
+    let x: Vec<f32> = r.iter().zip(&t).map(|(r, t)| r + t * w.x).collect();
+    let (z, below): (Vec<f32>, Vec<f32>) = t.iter().map(|t| (t * w.z, -t * w.z)).unzip();
+    let sources = SourceColumns { x: &x, y: &zero, z: &z, below: &below, travelled: &t, weight: [&one; 3] };
+    let scalar = rate(|| {
+        for (&r, &t) in black_box(r).iter().zip(&t) {
+            let entry = Entry { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w };
+            black_box(beam.eval_at_depth(&entry, t, &Exit { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::Z }, 0.0));
+        }
+    });
+    println!("{:<32} {:>10.1} 1e6 pairs/s, scalar", format!("beam at one depth, {name}"), scalar / 1e6);
+    for level in Level::available() {
+        let d = rate(|| {
+            black_box(directional.gather_at(level, black_box(Vec3::ZERO), Vec3::Z, entries, directions));
+        });
+        let b = rate(|| {
+            black_box(beam.gather_at(level, black_box(Vec3::ZERO), sources));
+        });
+        println!(
+            "{:<32} {:>10.1} 1e6 pairs/s; beam at one depth {:.1}, {level:?}",
+            format!("gather directional, {name}"),
+            d / 1e6,
+            b / 1e6
+        );
+    }
 }
 
 /// Evaluations of S_d in three channels, one pair of points after the other.
@@ -87,13 +130,15 @@ fn table() {
             gathered.map_or("-".into(), |v| format!("{:.0}", v / 1e6))
         );
     }
-    for model in coloured() {
+    for model in Model::all_for(&coloured(), true).unwrap() {
         println!(
-            "{:<12} {:>12.0} 1e6 pairs of points per second, three channels",
+            "{:<12} {:>12.2} 1e6 pairs of points per second, three channels",
             model.name().name(),
             model.visit(Pairs(&r)) / 1e6
         );
     }
+    gathers(&Medium::reduced(Rgb::splat(2.55), Rgb::splat(0.0011), 1.3).unwrap(), "grey", &r);
+    gathers(&coloured(), "three channels", &r);
     println!("vectorised: {:?}; gather: grey medium, three weights", Level::available());
 }
 

@@ -1,9 +1,9 @@
 //! Every row of the catalogue that lists a reflectance must reproduce it. The reference is the transfer equation for
-//! isotropic scattering under a Fresnel boundary (`optics::Boundary`), solved without diffusion theory and held to
+//! isotropic scattering under a Fresnel boundary (`optics::HalfSpace`), solved without diffusion theory and held to
 //! Monte Carlo beside its code.
 #![allow(clippy::unwrap_used)] // a test whose row is missing has failed
 
-use marmor::optics::{Boundary, CATALOGUE, ChannelOptics, Coefficients, Trust, find};
+use marmor::optics::{CATALOGUE, ChannelOptics, Coefficients, HalfSpace, Trust, find};
 
 /// How far a printed reflectance may be from the reference.
 const TOLERANCE: f64 = 0.02;
@@ -27,7 +27,7 @@ fn a_slip_of_ten_in_any_absorption_is_noticed() {
     let mut tried = 0;
     for row in CATALOGUE {
         let Some(listed) = row.reflectance else { continue };
-        let boundary = Boundary::new(row.eta);
+        let boundary = HalfSpace::new(row.eta);
         for c in 0..3 {
             let (s, a) = (row.sigma_s_prime_per_mm()[c], row.sigma_a_per_mm()[c]);
             for slip in [0.1, 10.0] {

@@ -3,24 +3,17 @@
 
 mod support;
 
-use marmor::bssrdf::{BeamChannel, Bssrdf, ChannelMedium, Entry, Exit, KappaExtinction, PhotonBeamDiffusion};
+use marmor::bssrdf::{BeamChannel, Bssrdf, Entry, Exit, KappaExtinction, PhotonBeamDiffusion};
 use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::optics::{FresnelMoments, Medium};
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use support::{Row, Score, table};
+use support::{AnyInput, Row, Score, any_input, both, channel, direction, grey};
 
 fn score(rows: &[Row]) -> Score {
     let mut score = Score::default();
     for row in rows {
-        // The table has reduced scattering only: g = 0.
-        let medium = ChannelMedium {
-            sigma_s: row.number("sigma_s_red"),
-            sigma_a: row.number("sigma_a"),
-            g: 0.0,
-            eta: row.number("eta"),
-        };
-        let channel = BeamChannel::new(&medium, true, KappaExtinction::Reduced);
+        let channel = BeamChannel::new(&channel(row), true, KappaExtinction::Reduced);
         let m = channel.exitance(DVec3::X * row.number("r"), DVec3::Z, -DVec3::Z);
         score.add(row, m as f32, row.number("M_multiple_kappa"));
     }
@@ -29,17 +22,7 @@ fn score(rows: &[Row]) -> Score {
 
 #[test]
 fn rows_of_the_table_are_met() {
-    score(&table("pbd_normal.csv")).hold("pbd_normal");
-}
-
-#[test]
-fn the_whole_table_is_met() {
-    let Some(rows) = support::whole_table("pbd_normal.csv") else { return };
-    score(&rows).hold("pbd_normal");
-}
-
-fn grey(sigma_s: f32, sigma_a: f32, g: f64, eta: f32) -> Medium {
-    Medium { sigma_s: Rgb::splat(sigma_s), sigma_a: Rgb::splat(sigma_a), g, eta }
+    both("pbd_normal.csv", |name, rows| score(rows).hold(name));
 }
 
 fn skin() -> Medium {
@@ -181,13 +164,6 @@ fn channels_do_not_know_each_other() {
     }
 }
 
-fn direction() -> impl Strategy<Value = Vec3> {
-    (-1.0_f32..=1.0, 0.0_f32..6.3).prop_map(|(z, phi)| {
-        let s = (1.0 - z * z).max(0.0).sqrt();
-        Vec3::new(s * phi.cos(), s * phi.sin(), z)
-    })
-}
-
 proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -218,21 +194,8 @@ proptest! {
     }
 
     #[test]
-    fn it_is_finite_and_not_negative_for_any_input(
-        x in direction(), log_r in -40.0_f32..30.0, w in direction(), n_i in direction(), u in 0.0_f32..1.0,
-        log_s in -14.0_f32..14.0, log_a in -14.0_f32..14.0, g in -0.99_f64..0.999_999_9, eta in 0.4_f32..4.0, zero in 0..7,
-    ) {
-        let mut medium = grey(log_s.exp(), log_a.exp(), g, eta);
-        let mut x = x * log_r.exp();
-        match zero {
-            0 => medium.sigma_a = Rgb::BLACK,
-            1 => medium.sigma_s = Rgb::BLACK,
-            2 => x = Vec3::ZERO,
-            3 => x = n_i * log_r.exp(),
-            4 => x = w * log_r.exp(),
-            _ => {}
-        }
-        medium.sigma_a.0[1] *= 3.0;
+    fn it_is_finite_and_not_negative_for_any_input(input in any_input(), u in 0.0_f32..1.0) {
+        let AnyInput { medium, x, w, n_i, .. } = input;
         let model = model(&medium);
         let (entry, exit) = (Entry { x: Vec3::ZERO, n: n_i, w }, exit_at(x));
         let t = model.sample_depth(u.min(0.999_999_94));

@@ -1,4 +1,4 @@
-//! Boundaries, constants and distance-only models against high-precision tables: tests/data/README-distance.md says where the
+//! Boundaries, constants and distance-only models against high-precision tables: tests/data/README.md says where the
 //! rows come from. With `MARMOR_REFERENCE_DIR` set, against the whole tables.
 #![allow(clippy::unwrap_used, clippy::print_stdout)] // a table that cannot be read is a failed test; scores are shown
 
@@ -7,15 +7,7 @@ mod support;
 use marmor::bssrdf::{BetterDipole, NormalisedDiffusion, Radial, Slab, StandardDipole, WidthFit};
 use marmor::math::Rgb;
 use marmor::optics::{AlbedoCurve, AlbedoLaw, FresnelMoments, Medium, Reduced, split};
-use support::{Row, Score, table, whole_table};
-
-/// Runs `check` on the committed rows of `file`, and on the whole table where there is one.
-fn both(file: &str, check: impl Fn(&str, &[Row])) {
-    check(file, &table(file));
-    if let Some(rows) = whole_table(file) {
-        check(&format!("whole {file}"), &rows);
-    }
-}
+use support::{Row, Score, both};
 
 fn medium(row: &Row, eta: &str) -> Medium {
     let coefficient = |name: &str| Rgb::splat(row.number(name) as f32);

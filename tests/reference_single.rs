@@ -8,18 +8,12 @@ use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::optics::{Medium, refract, transmittance};
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use support::{Row, Score, table};
+use support::{Row, Score, both, channel};
 
 fn score(rows: &[Row]) -> Score {
     let mut score = Score::default();
     for row in rows {
-        let medium = ChannelMedium {
-            sigma_s: row.number("sigma_s"),
-            sigma_a: row.number("sigma_a"),
-            g: row.number("g"),
-            eta: row.number("eta"),
-        };
-        let m = SingleChannel::new(&medium).exitance(DVec3::X * row.number("r"), DVec3::Z, -DVec3::Z);
+        let m = SingleChannel::new(&channel(row)).exitance(DVec3::X * row.number("r"), DVec3::Z, -DVec3::Z);
         score.add(row, m as f32, row.number("M1"));
     }
     score
@@ -27,16 +21,10 @@ fn score(rows: &[Row]) -> Score {
 
 #[test]
 fn rows_of_the_table_are_met() {
-    score(&table("single_scatter_plane.csv")).hold("single_scatter_plane");
+    both("single_scatter_plane.csv", |name, rows| score(rows).hold(name));
 }
 
-#[test]
-fn the_whole_table_is_met() {
-    let Some(rows) = support::whole_table("single_scatter_plane.csv") else { return };
-    score(&rows).hold("single_scatter_plane");
-}
-
-fn channel(albedo: f64, g: f64, eta: f64) -> ChannelMedium {
+fn of_albedo(albedo: f64, g: f64, eta: f64) -> ChannelMedium {
     ChannelMedium { sigma_s: albedo, sigma_a: 1.0 - albedo, g, eta }
 }
 
@@ -47,7 +35,7 @@ fn grey(albedo: f32, g: f64, eta: f32) -> Medium {
 #[test]
 fn energies_of_a_half_space_are_the_known_ones() {
     for (eta, energy) in [(1.0, 0.15343), (1.3, 0.07572), (1.5, 0.05362)] {
-        let total = SingleChannel::new(&channel(1.0, 0.0, eta)).total();
+        let total = SingleChannel::new(&of_albedo(1.0, 0.0, eta)).total();
         assert!((total - energy).abs() < 5.1e-6, "{eta}: {total}");
     }
 }
@@ -73,7 +61,7 @@ fn over_the_plane(medium: &ChannelMedium, w: DVec3) -> f64 {
 #[test]
 fn the_profile_integrates_to_the_total() {
     for (albedo, g, eta) in [(1.0, 0.0, 1.0), (1.0, 0.0, 1.3), (0.7, 0.8, 1.5), (0.7, -0.9, 1.3), (0.9, 0.3, 0.75)] {
-        let medium = channel(albedo, g, eta);
+        let medium = of_albedo(albedo, g, eta);
         let (sum, total) = (over_the_plane(&medium, -DVec3::Z), SingleChannel::new(&medium).total());
         assert!((sum / total - 1.0).abs() < 1e-4, "{albedo} {g} {eta}: {sum} against {total}");
     }

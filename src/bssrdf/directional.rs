@@ -2,14 +2,10 @@
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::exponential::{exp, exp_m1};
-use super::true_albedo::half_space_albedo;
 use super::{Bssrdf, Claims, Entry, Exit};
 use crate::math::{DVec3, GaussLegendre, Rgb};
-use crate::optics::Medium;
+use crate::optics::{HalfSpace, Medium};
 use std::f64::consts::PI;
-
-/// Below this reduced albedo a [`DirectionalDipole`] is 0: the true reflectance is below 1e-7, the formula's is 0.14.
-const LEAST_ALBEDO: f64 = 1e-6;
 
 /// The directional dipole [FHK14]: a ray source along the refracted direction and its mirror image in a plane
 /// through the two points, modified so that it contains the line between them.
@@ -30,8 +26,11 @@ const LEAST_ALBEDO: f64 = 1e-6;
 ///   independent of the angle of incidence. The far field is right, the near field some 30 % too bright.
 ///   `calibrated` scales the whole to the true albedo; see [`Self::new`].
 /// * Not reciprocal: exchanging the ends changes S_d by a median 20 % on a plane at 0.1 to 10 mean free paths.
-/// * Domain: α′ above 0.9 or so; 0 for α′ below 1e-6, where the published formula still emits 0.14. A line can
-///   appear where n_o·w changes sign, because d_r jumps there.
+/// * Domain: α′ above 0.9 or so. Below, the published formula is followed down to the smallest σ_s′ that f32 holds;
+///   its total does not tend to 0 with α′ but to 0.14 at η = 1.3, while the truth does. Without any scattering it
+///   is 0. A line can appear where n_o·w changes sign, because d_r jumps there.
+/// * Sign: the image outweighs the source at some exits. Rendering takes 0 there, as published;
+///   [`Self::eval_signed`] is the difference itself.
 /// * Always has the exit factor 1/(4 C_phi(1/η)), as published.
 ///
 /// Computed in f64 from f32 inputs, in units of the transport mean free path, in a form without cancellation: real
@@ -128,6 +127,12 @@ fn modified_normal(x: DVec3, r: f64, n: DVec3) -> DVec3 {
     if r > 0.0 { star } else { n }
 }
 
+/// The clamp of [FHK14]: no radiance where the image outweighs the source. Lets no NaN through.
+#[inline(always)]
+pub(super) fn clamped(value: f64) -> f64 {
+    if value > 0.0 { value } else { 0.0 }
+}
+
 impl DirectionalChannel {
     /// One channel as published, for any α′ above 0; 0 without scattering.
     pub fn new(medium: &ChannelMedium) -> Self {
@@ -221,7 +226,7 @@ impl DirectionalChannel {
                 rule.integrate(a, a + width, |y| {
                     let r = unit * y.exp();
                     let pair = Pair { r, rho: r, x_w: 0.0, x_n: 0.0, mu_0: 1.0, w_star: -1.0, n_star: 1.0 };
-                    2.0 * PI * r * r * self.kernel(&pair, 0.0).max(0.0)
+                    2.0 * PI * r * r * clamped(self.kernel(&pair, 0.0))
                 })
             })
             .sum();
@@ -237,6 +242,7 @@ impl DirectionalDipole {
     pub fn new(medium: &Medium, calibrated: bool) -> Self {
         let boundary = Boundary::new(f64::from(medium.eta));
         let media: [ChannelMedium; 3] = std::array::from_fn(|c| ChannelMedium::of(medium, c));
+        let half_space = HalfSpace::new(f64::from(medium.eta));
         let grey = medium.is_grey();
         let mut channels = media.map(|m| DirectionalChannel::new(&m));
         let mut totals = [0.0; 3];
@@ -245,12 +251,9 @@ impl DirectionalDipole {
                 (channels[c], totals[c]) = (channels[0], totals[0]);
                 continue;
             }
-            if media[c].alpha_prime() < LEAST_ALBEDO {
-                channels[c].scale = 0.0;
-            }
             totals[c] = channels[c].total(&boundary);
             if calibrated && totals[c] > 0.0 {
-                let truth = half_space_albedo(media[c].alpha_prime(), media[c].eta);
+                let truth = half_space.reflectance(media[c].absorbed());
                 channels[c].scale *= truth / totals[c];
                 totals[c] = truth;
             }
@@ -268,6 +271,23 @@ impl DirectionalDipole {
         (&self.channels, self.grey)
     }
 
+    /// S_d before the clamp at 0 [1/(unit² sr)]: negative where the image outweighs the source. What tables of the
+    /// formula hold; not for rendering.
+    pub fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        self.each_channel(entry, exit, 0.0, |value| value)
+    }
+
+    fn each_channel(&self, entry: &Entry, exit: &Exit, rate: f32, finish: impl Fn(f64) -> f64) -> Rgb {
+        let x = exit.x.as_dvec3() - entry.x.as_dvec3();
+        let pair = Pair::new(x, entry.n.as_dvec3(), entry.w.as_dvec3(), exit.n.as_dvec3());
+        let gain = f64::from(rate) * pair.r;
+        let value = |k: &DirectionalChannel| to_finite(finish(k.kernel(&pair, gain)));
+        if self.grey {
+            return Rgb::splat(value(&self.channels[0]));
+        }
+        Rgb::from_fn(|c| value(&self.channels[c]))
+    }
+
     /// Delta-Eddington extinction σ_s (1 - g²) + σ_a [1/unit] of the reduced-intensity part S_dE of [FHK14]: the
     /// light that is refracted in, attenuated by exp(-extinction · length) along a straight path, and refracted
     /// out. It is a specular path of the renderer, multiplied by that factor, and no part of [`Bssrdf::eval`].
@@ -278,14 +298,7 @@ impl DirectionalDipole {
 
 impl Bssrdf for DirectionalDipole {
     fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
-        let x = exit.x.as_dvec3() - entry.x.as_dvec3();
-        let pair = Pair::new(x, entry.n.as_dvec3(), entry.w.as_dvec3(), exit.n.as_dvec3());
-        let gain = f64::from(rate) * pair.r;
-        let value = |k: &DirectionalChannel| to_finite(k.kernel(&pair, gain).max(0.0));
-        if self.grey {
-            return Rgb::splat(value(&self.channels[0]));
-        }
-        Rgb::from_fn(|c| value(&self.channels[c]))
+        self.each_channel(entry, exit, rate, clamped)
     }
 
     fn decay(&self) -> f32 {

@@ -1,6 +1,6 @@
 //! Vectorised sums of the directional dipole over many cached entries.
 
-use super::directional::{DirectionalChannel, DirectionalDipole, Pair};
+use super::directional::{DirectionalChannel, DirectionalDipole, Pair, clamped};
 use super::{EntryColumns, radial::LANES};
 use crate::math::{DVec3, Kernel, Level, Vec3, dispatch_at};
 
@@ -56,8 +56,7 @@ impl Kernel for Sum<'_> {
                     let channel = self.channels[c];
                     for (i, s) in s.iter_mut().enumerate() {
                         let value = channel.kernel(&Pair::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
-                        // Neither the clamp nor this lets a NaN through.
-                        *s = if value > 0.0 { value.min(f64::from(f32::MAX)) } else { 0.0 };
+                        *s = clamped(value).min(f64::from(f32::MAX));
                     }
                 }
                 for ((lane, s), &weight) in lanes[c].iter_mut().zip(&s).zip(&weight[c]) {

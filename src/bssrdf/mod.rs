@@ -17,7 +17,6 @@ mod radial;
 mod single;
 mod slab;
 mod standard;
-mod true_albedo;
 
 use crate::error::{Error, Result};
 use crate::math::{Rgb, Vec3};
@@ -255,6 +254,19 @@ impl Model {
             Self::Better(model) => Some(model),
             Self::Normalised(model) => Some(model),
             Self::Slab(_) | Self::Directional(_) | Self::Beam(_) => None,
+        }
+    }
+
+    /// S_d as the formula gives it [1/(unit² sr)], before the clamp at 0 that [`Bssrdf::eval`] of `directional` and
+    /// `slab` ends with: what tables are compared with. The other models are nowhere negative.
+    pub fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        match self {
+            Self::Standard(model) => model.eval(entry, exit),
+            Self::Better(model) => model.eval(entry, exit),
+            Self::Directional(model) => model.eval_signed(entry, exit),
+            Self::Beam(model) => model.eval(entry, exit),
+            Self::Normalised(model) => model.eval(entry, exit),
+            Self::Slab(model) => model.eval_signed(entry, exit),
         }
     }
 

@@ -19,6 +19,18 @@ pub enum WidthFit {
 }
 
 impl WidthFit {
+    /// All fits.
+    pub const ALL: [Self; 3] = [Self::Searchlight, Self::Diffuse, Self::DiffusionLength];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Searchlight => "searchlight",
+            Self::Diffuse => "diffuse",
+            Self::DiffusionLength => "dmfp",
+        }
+    }
+
     /// s(A) for an albedo in [0, 1].
     pub fn s(self, albedo: f64) -> f64 {
         match self {
@@ -26,6 +38,17 @@ impl WidthFit {
             Self::Diffuse => 1.9 - albedo + 3.5 * (albedo - 0.8).powi(2),
             Self::DiffusionLength => 3.5 + 100.0 * (albedo - 0.33).powi(4),
         }
+    }
+}
+
+impl std::str::FromStr for WidthFit {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|fit| fit.name() == name).ok_or_else(|| {
+            let hint = crate::error::did_you_mean(name, Self::ALL.map(Self::name));
+            Error::usage(format!("no fit `{name}`{hint}; there are searchlight, diffuse, dmfp"))
+        })
     }
 }
 

@@ -133,6 +133,30 @@ impl Slab {
         dispatch_at(Level::best(), batch);
     }
 
+    /// S_d before the clamp at 0 [1/(unit² sr)]: far out between unlike boundaries the sum of the images is negative.
+    /// What tables of the formula hold; not for rendering.
+    pub fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        self.signed(entry, exit, 0.0)
+    }
+
+    fn signed(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
+        let x = exit.x - entry.x;
+        let through = entry.n.dot(exit.n) < 0.0;
+        let (mut r2, mut rest) = (x.length_squared(), 0.0);
+        if through {
+            let across = (entry.n - exit.n).normalize_or_zero();
+            let height = x.dot(across);
+            // The weight is of the straight distance: what it has more than r joins at the end.
+            let straight = r2.sqrt();
+            r2 = (x - across * height).length_squared();
+            let more = height * height / (straight + r2.sqrt()).max(f32::MIN_POSITIVE);
+            rest = (rate * more * std::f32::consts::LOG2_E).min(250.0);
+        }
+        let faces = if through { &self.transmitted } else { &self.reflected };
+        let value = |face: &Face| times_exp2(face.compensated(r2, rate), rest);
+        if self.grey { Rgb::splat(value(&faces[0])) } else { Rgb::from_fn(|c| value(&faces[c])) }
+    }
+
     /// Diffuse transmittance per entered flux; the reflectance is [`Bssrdf::total`].
     pub fn total_transmitted(&self) -> Rgb {
         self.total_transmitted
@@ -271,22 +295,8 @@ impl Formula for &Face {
 
 impl Bssrdf for Slab {
     fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
-        let x = exit.x - entry.x;
-        let through = entry.n.dot(exit.n) < 0.0;
-        let (mut r2, mut rest) = (x.length_squared(), 0.0);
-        if through {
-            let across = (entry.n - exit.n).normalize_or_zero();
-            let height = x.dot(across);
-            // The weight is of the straight distance: what it has more than r joins at the end.
-            let straight = r2.sqrt();
-            r2 = (x - across * height).length_squared();
-            let more = height * height / (straight + r2.sqrt()).max(f32::MIN_POSITIVE);
-            rest = (rate * more * std::f32::consts::LOG2_E).min(250.0);
-        }
-        let faces = if through { &self.transmitted } else { &self.reflected };
         // Images of unlike boundaries can turn the far exitance negative: no light.
-        let value = |face: &Face| times_exp2(face.compensated(r2, rate), rest).max(0.0);
-        if self.grey { Rgb::splat(value(&faces[0])) } else { Rgb::from_fn(|c| value(&faces[c])) }
+        self.signed(entry, exit, rate).map(|value| value.max(0.0))
     }
 
     fn decay(&self) -> f32 {

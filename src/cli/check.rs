@@ -96,7 +96,7 @@ fn describe(surface: &Surface) -> String {
             format!(
                 "translucent, {}, model {}, eta {eta}, reduced albedo {:.4?}, transport mean free path {:.4?} unit",
                 t.source,
-                t.model.name(),
+                t.model_text(),
                 t.medium.alpha_prime().0,
                 free_path.0
             )

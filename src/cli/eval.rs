@@ -1,6 +1,6 @@
 //! `marmor eval`.
 
-use marmor::bssrdf::{KappaExtinction, ModelName};
+use marmor::bssrdf::{KappaExtinction, ModelName, WidthFit};
 use marmor::report::{Batch, BatchOptions};
 use marmor::{Error, Result};
 use std::io::{self, BufRead, Write};
@@ -12,12 +12,15 @@ use std::process::ExitCode;
 #[command(after_help = "\
 The header names the columns, in any order: sigma_s, sigma_a, g, eta, then either r (a plane, normal
 incidence) or x,y,z (exit minus entry), nix,niy,niz and nox,noy,noz (outward unit normals), wx,wy,wz
-(refracted direction inside). `slab` also needs `thickness` and takes `eta_far`. Any unit of length.
-Other columns, empty lines and lines that begin with # pass through.
+(refracted direction inside). sigma_s is not reduced; with g = 0 it may be. `slab` also needs `thickness` and takes
+`eta_far`. `normalised` takes A and l (see --width) in place of the coefficients; eta may then be left out. Any unit of
+length. Other columns, empty lines and lines that begin with # pass through.
 
-Appended: S_d [1/(unit² sr)]; with r also `exitance`, M(r) [1/unit²] per entered flux. Results come
-last, so that they win where the input has a column of the same name.
-Exit code 2: bad header or option; 3: bad row, with its line.")]
+Appended: S_d [1/(unit² sr)]; with r also `exitance`, M(r) [1/unit²] per entered flux. Results come last, so that
+they win where the input has a column of the same name. S_d is the formula's own value, which is negative in places
+for `directional` and `slab`; rendering has 0 there, and so has --clamped.
+Exit code 2: bad header or option; 3: bad row, with its line. A bad row ends the run; with --keep-going its results
+stay empty and the exit code waits until the end.")]
 pub struct Args {
     /// BSSRDF model
     #[arg(long, value_name = "NAME")]
@@ -34,6 +37,16 @@ pub struct Args {
     /// Model `slab`, rows with r: light that leaves by the far face
     #[arg(long)]
     transmitted: bool,
+    /// 0 where the formula is negative, as rendering has it
+    #[arg(long)]
+    clamped: bool,
+    /// Model `normalised`, rows with A and l: the fit, and with it what l is: `searchlight` and `diffuse` (mean free
+    /// path), `dmfp` (diffusion length) [default: dmfp]
+    #[arg(long, value_name = "FIT")]
+    width: Option<WidthFit>,
+    /// Leave the results of a bad row empty and go on
+    #[arg(long)]
+    keep_going: bool,
     /// Append exact single scattering on a plane too [1/unit²], as `single`
     #[arg(long)]
     single: bool,
@@ -53,18 +66,21 @@ pub fn run(args: Args) -> Result<ExitCode> {
     refuse(args.calibrated, "--calibrated", ModelName::Directional)?;
     refuse(args.kappa_full, "--kappa-full", ModelName::Beam)?;
     refuse(args.transmitted, "--transmitted", ModelName::Slab)?;
+    refuse(args.width.is_some(), "--width", ModelName::Normalised)?;
     let options = BatchOptions {
         model: args.model,
         exit_normalisation: !args.no_exit_normalisation,
         calibrated: args.calibrated,
         kappa: if args.kappa_full { KappaExtinction::Full } else { KappaExtinction::Reduced },
+        width: args.width.unwrap_or(WidthFit::DiffusionLength),
         transmitted: args.transmitted,
+        clamped: args.clamped,
         single: args.single,
     };
     let mut input = io::BufReader::with_capacity(BUFFER, io::stdin().lock());
     let mut output = io::stdout().lock();
     let mut out = String::with_capacity(BUFFER + 4096);
-    let outcome = evaluate(&mut input, options, &mut out, |out| {
+    let outcome = evaluate(&mut input, options, args.keep_going, &mut out, |out| {
         let written = output.write_all(out.as_bytes()).and_then(|()| output.flush());
         out.clear();
         written
@@ -85,6 +101,7 @@ enum Stop {
 fn evaluate(
     input: &mut impl BufRead,
     options: BatchOptions,
+    keep_going: bool,
     out: &mut String,
     mut flush: impl FnMut(&mut String) -> io::Result<()>,
 ) -> std::result::Result<(), Stop> {
@@ -95,6 +112,7 @@ fn evaluate(
         })
     };
     let (mut batch, mut line, mut number) = (None, String::new(), 0_u64);
+    let (mut first_bad, mut bad) = (None, 0_u64);
     loop {
         line.clear();
         number += 1;
@@ -103,7 +121,10 @@ fn evaluate(
             Stop::Error(Error::file(Path::new("standard input"), &format!("read line {number}"), cause))
         })?;
         if read == 0 {
-            return flush(out);
+            flush(out)?;
+            return first_bad.map_or(Ok(()), |error: Error| {
+                Err(Stop::Error(error.within(format_args!("{bad} bad rows left empty; the first"))))
+            });
         }
         let row = line.trim_end_matches(['\n', '\r']).trim_start_matches('\u{feff}');
         let computed = match &mut batch {
@@ -118,9 +139,18 @@ fn evaluate(
             }),
             Some(batch) => batch.row(row, out).map_err(|e| e.within(format_args!("standard input, line {number}"))),
         };
-        if let Err(error) = computed {
-            flush(out)?;
-            return Err(Stop::Error(error));
+        match (computed, &batch) {
+            (Ok(()), _) => {}
+            (Err(error), Some(batch)) if keep_going => {
+                bad += 1;
+                first_bad.get_or_insert(error);
+                out.push_str(row);
+                out.extend(std::iter::repeat_n(',', batch.appended().matches(',').count()));
+            }
+            (Err(error), _) => {
+                flush(out)?;
+                return Err(Stop::Error(error));
+            }
         }
         out.push('\n');
         if out.len() >= BUFFER {

@@ -41,42 +41,40 @@ fn outside(row: &Measured) -> bool {
     row.optics().iter().any(ChannelOptics::outside_diffusion)
 }
 
+/// A table of at most 100 columns, a section for each source.
 fn table(rows: &[&Measured]) -> String {
     let mut out = String::new();
-    let _ = writeln!(
-        out,
-        "{:<27} {:<7} {:>4}  {:^20} {:^20} {:^20} {:^17}  models to trust",
-        "material", "source", "eta", "reduced albedo", "l' [mm]", "1/sigma_tr [mm]", "reflectance"
-    );
+    let mut source = "";
     for row in rows {
+        if row.source != source {
+            let blank = if source.is_empty() { "" } else { "\n" };
+            source = row.source;
+            let _ = writeln!(out, "{blank}[{source}] {}", row.table);
+            let _ = writeln!(
+                out,
+                "{:<27} {:>4} {:^20}  {:^20}  models to trust",
+                "material", "eta", "reduced albedo", "l' [mm]"
+            );
+        }
         let optics = row.optics();
-        let three =
-            |f: &dyn Fn(&ChannelOptics) -> f64| optics.iter().map(|k| short(f(k))).collect::<Vec<_>>().join(" ");
-        let r = row.reflectance_isotropic().map(|r| format!("{r:.3}")).join(" ");
+        let lengths = optics.map(|k| short(k.transport_mean_free_path)).join(" ");
         let outside: String =
             optics.iter().zip("rgb".chars()).filter(|(k, _)| k.outside_diffusion()).map(|(_, c)| c).collect();
-        let mark = if outside.is_empty() { String::new() } else { format!("; outside: {outside}") };
-        let _ = writeln!(
-            out,
-            "{:<27} {:<7} {:>4}  {} {} {} {}  {}{mark}",
-            row.name,
-            row.source,
-            row.eta,
-            optics.map(|k| albedo(&k)).join(" "),
-            three(&|k| k.transport_mean_free_path),
-            three(&|k| k.diffusion_length),
-            r,
-            row.trust()
-        );
+        let trust = match (row.trust().models(), outside.as_str()) {
+            ([], "") => "trace paths".to_owned(),
+            ([], _) => format!("trace paths ({outside})"),
+            _ => row.trust().to_string(),
+        };
+        let albedos = optics.map(|k| albedo(&k)).join(" ");
+        let _ = writeln!(out, "{:<27} {:>4} {albedos}  {lengths}  {trust}", row.name, row.eta);
     }
     let outside = rows.iter().filter(|row| outside(row)).count();
     let _ = write!(
         out,
-        "\nRed, green, blue. l' is the transport mean free path 1/(sigma_s (1 - g) + sigma_a), 1/sigma_tr the distance over\n\
-         which diffuse light fades. Reflectance: half space, normal incidence, per entered flux, from the transfer equation\n\
-         for isotropic scattering with the reduced coefficients.\n\
-         {outside} of {} materials are outside diffusion theory in some channel (reduced albedo below 0.5), marked\n\
-         `outside`: no BSSRDF model is near the truth there; `--method volume_path` is. `marmor materials NAME` shows one row.",
+        "\nRed, green, blue; l' is the transport mean free path 1/(sigma_s (1 - g) + sigma_a).\n\
+         {outside} of {} materials are outside diffusion theory in some channel (reduced albedo below 0.5), named in\n\
+         brackets: no BSSRDF model is near the truth there, only paths traced through the volume are.\n\
+         `marmor materials NAME` shows one row: coefficients, g, source, diffusion length, reflectance.",
         rows.len()
     );
     out

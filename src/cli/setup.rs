@@ -83,7 +83,7 @@ impl Prepared {
             .materials
             .iter()
             .filter_map(|m| match &m.surface {
-                Surface::Translucent(t) => Some(format!("{}: {}", m.name, t.model.name())),
+                Surface::Translucent(t) => Some(format!("{}: {}", m.name, t.model_text())),
                 _ => None,
             })
             .collect();

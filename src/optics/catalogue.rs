@@ -157,7 +157,7 @@ impl Measured {
     /// isotropic scattering with this row's reduced coefficients. Exact for rows that list reduced scattering; for
     /// others the error of that similarity.
     pub fn reflectance_isotropic(&self) -> [f64; 3] {
-        let boundary = half_space::Boundary::new(self.eta);
+        let boundary = half_space::HalfSpace::new(self.eta);
         self.optics().map(|channel| boundary.reflectance(channel.absorbed_prime))
     }
 }

@@ -10,8 +10,8 @@ use crate::math::GaussLegendre;
 /// Gauss points on each side of the critical angle.
 const POINTS: usize = 24;
 
-/// A boundary of given index and the angles at which the equation is solved.
-pub struct Boundary {
+/// A half space behind a boundary of given index, and the angles at which the equation is solved.
+pub struct HalfSpace {
     /// Cosine inside, weight, Fresnel reflectance met from inside.
     nodes: Vec<Node>,
 }
@@ -22,8 +22,8 @@ struct Node {
     reflectance: f64,
 }
 
-impl Boundary {
-    /// A boundary with `eta` = n_inside / n_outside > 0.
+impl HalfSpace {
+    /// Behind a boundary with `eta` = n_inside / n_outside > 0.
     pub fn new(eta: f64) -> Self {
         // The reflectance has a kink at the critical angle: one panel on each side of it, and a square-root
         // substitution mu = mu_c + (1 - mu_c) u² that resolves the boundary layer above.
@@ -39,8 +39,9 @@ impl Boundary {
         Self { nodes }
     }
 
-    /// Diffuse reflectance in [0, 1] per entered flux of light that enters along the normal, for 1 - α′ =
-    /// `absorbed` in [0, 1].
+    /// Diffuse reflectance in [0, 1] per entered flux of light that enters along the normal, all orders, for 1 - α′ =
+    /// `absorbed` in [0, 1]. Good to 1e-4 for isotropic scattering. With g ≠ 0 it is similarity: at g = 0.8 1 % high
+    /// for α′ = 0.995, 5 % for 0.95 and 30 % for 0.64.
     pub fn reflectance(&self, absorbed: f64) -> f64 {
         let albedo = 1.0 - absorbed;
         if albedo <= 0.0 {
@@ -74,7 +75,7 @@ impl Boundary {
         }
         let leaving: f64 =
             std::iter::zip(&self.nodes, &arriving).map(|(n, u)| n.weight * n.mu * (1.0 - n.reflectance) * u).sum();
-        2.0 * std::f64::consts::PI * leaving
+        (2.0 * std::f64::consts::PI * leaving).min(1.0)
     }
 
     /// H at the nodes, from 1/H(mu) = sqrt(1 - α) + α/2 ∫ mu' H(mu') / (mu + mu') dmu', which converges for α = 1 too.
@@ -113,25 +114,32 @@ mod tests {
 
     #[test]
     fn nothing_is_lost_without_absorption() {
-        for eta in [0.75, 1.0, 1.3, 1.5, 2.5] {
-            let total = Boundary::new(eta).reflectance(0.0);
+        for eta in [0.75, 1.0, 1.05, 1.3, 1.5, 2.5, 4.0] {
+            let total = HalfSpace::new(eta).reflectance(0.0);
             assert!((total - 1.0).abs() < 2e-5, "eta {eta}: {total}");
         }
     }
 
-    /// Own Monte Carlo of the transfer equation, 1e7 to 2e7 photons, total per entered flux and standard error.
+    /// Own Monte Carlo of the transfer equation (see tests/data/README.md), 1e7 to 2e7 photons, total per entered flux and standard error.
     #[test]
     fn monte_carlo_agrees() {
         let runs = [
+            (1.3, 0.001, 0.871_556_974, 8.1e-5),
             (1.3, 0.001_420_573_243, 0.849_354_605, 6.1e-5),
+            (1.3, 0.01, 0.656_723_416, 1.13e-4),
             (1.3, 0.022_817_460_32, 0.536_825_976, 8.3e-5),
             (1.3, 0.090_909_090_91, 0.306_586_081, 7.4e-5),
-            (1.5, 0.1, 0.2291, 1.0e-4),
-            (1.0, 0.1, 0.4147, 1.5e-4),
-            (0.75, 0.01, 0.7440, 1.5e-4),
+            (1.3, 0.1, 0.290_936_304, 1.03e-4),
+            (1.3, 0.5, 0.063_587_941, 4.5e-5),
+            (1.5, 0.000_957_985_5, 0.837_940_170, 6.3e-5),
+            (1.5, 0.1, 0.229_135_203, 9.6e-5),
+            (1.0, 0.01, 0.752_726_962, 1.03e-4),
+            (1.0, 0.1, 0.414_712_944, 1.11e-4),
+            (0.75, 0.01, 0.744_046_607, 1.04e-4),
+            (0.75, 0.1, 0.401_116_651, 1.11e-4),
         ];
         for (eta, absorbed, total, error) in runs {
-            let ours = Boundary::new(eta).reflectance(absorbed);
+            let ours = HalfSpace::new(eta).reflectance(absorbed);
             assert!((ours - total).abs() < 6.0 * error, "eta {eta}, 1 - α {absorbed}: {ours} against {total}");
         }
     }

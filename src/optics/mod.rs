@@ -12,7 +12,7 @@ mod validity;
 
 pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
 pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
-pub use half_space::Boundary;
+pub use half_space::HalfSpace;
 pub use inversion::{AlbedoCurve, AlbedoLaw, better_total, medium_from_colour, standard_total};
 pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;

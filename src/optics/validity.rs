@@ -63,7 +63,7 @@ impl ChannelOptics {
 
 /// Which models are near the truth, after Monte Carlo runs of a half space at normal incidence: median error of the
 /// radial profile 5 % for `beam` with single scattering, 14 % for `better` with it, 28 % for `standard`; the total of
-/// `standard` is within 2 % for α′ > 0.9. docs/materials.md has the chart.
+/// `standard` is within 2 % for α′ > 0.9. docs/models.md has the chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Trust {
     /// α′ ≥ 0.9, g ≤ 0.8: every diffusion model has the colour, `beam` and `better` also the sharpness.

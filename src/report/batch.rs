@@ -1,20 +1,14 @@
 //! Rows of a CSV in, the same rows with S_d out: the models' rendering code for scripts and tests.
 
-use crate::bssrdf::{
-    Bssrdf, ChannelMedium, DirectionalDipole, Entry, Exit, KappaExtinction, Model, ModelName, ModelVisitor,
-    PhotonBeamDiffusion, SingleChannel, Slab,
-};
+use super::batch_model::{Inputs, Place, Prepared, Substance};
+use crate::bssrdf::{KappaExtinction, ModelName, WidthFit};
 use crate::error::did_you_mean;
-use crate::math::{DVec3, Rgb, Vec3};
-use crate::optics::{FresnelMoments, Medium};
 use crate::{Error, Result};
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
 /// Media whose models are kept; rows of a table come back to few media, and memory stays flat if they do not.
 const KEPT_MODELS: usize = 1024;
-/// How far a given direction or normal may be from unit length.
-const UNIT_TOLERANCE: f64 = 1e-3;
 
 /// Which model a batch evaluates.
 #[derive(Clone, Copy, Debug)]
@@ -27,8 +21,12 @@ pub struct BatchOptions {
     pub calibrated: bool,
     /// The extinction in the near-field correction of `beam`.
     pub kappa: KappaExtinction,
+    /// The fit that makes a width of the columns `A` and `l`, model `normalised`.
+    pub width: WidthFit,
     /// Rows with r: exit by the far face of the `slab`.
     pub transmitted: bool,
+    /// 0 where the formula is negative, as rendering has it; else the formula's own value.
+    pub clamped: bool,
     /// Append exact single scattering too: exitance of a plane [1/unit²] per entered flux.
     pub single: bool,
 }
@@ -41,7 +39,9 @@ impl BatchOptions {
             exit_normalisation: true,
             calibrated: false,
             kappa: KappaExtinction::default(),
+            width: WidthFit::DiffusionLength,
             transmitted: false,
+            clamped: false,
             single: false,
         }
     }
@@ -56,29 +56,25 @@ pub struct Batch {
     fields: Vec<(usize, usize)>,
 }
 
-/// A model in a unit of length near its transport mean free path, so that no input leaves the range of f32.
-struct Prepared {
-    model: Model,
-    /// That unit: a power of two, which moves no digit of the input.
-    length: f64,
-    /// M over S_d: π 4 C_phi(1/eta) of the face it leaves by, or π without exit normalisation.
-    exit_factor: f64,
-    single: SingleChannel,
-}
-
 /// Where the inputs stand in a row.
 struct Columns {
-    sigma_s: usize,
-    sigma_a: usize,
-    g: usize,
-    eta: usize,
+    substance: SubstanceColumns,
+    /// Absent only beside `A` and `l`, where it is 1.
+    eta: Option<usize>,
     thickness: Option<usize>,
     eta_far: Option<usize>,
-    place: Place,
+    place: PlaceColumns,
     count: usize,
 }
 
-enum Place {
+enum SubstanceColumns {
+    /// sigma_s, sigma_a, g.
+    Coefficients([usize; 3]),
+    /// A, l.
+    Profile([usize; 2]),
+}
+
+enum PlaceColumns {
     /// Distance on a plane, normal incidence.
     Plane(usize),
     /// x_o - x_i, normals at entry and exit, refracted direction inside.
@@ -97,12 +93,15 @@ impl Batch {
         split(header, &mut fields);
         let names: Vec<&str> = fields.iter().map(|&(a, b)| field(header, a, b)).collect();
         let columns = Columns::new(&names, options.model)?;
+        if options.single && matches!(columns.substance, SubstanceColumns::Profile(_)) {
+            return Err(Error::usage("single scattering needs sigma_s, sigma_a and g, not `A` and `l`"));
+        }
         Ok(Self { options, columns, models: HashMap::new(), last: [0; 6], fields })
     }
 
     /// Names of the columns that [`Self::row`] appends, with the comma before each.
     pub fn appended(&self) -> String {
-        let exitance = if matches!(self.columns.place, Place::Plane(_)) { ",exitance" } else { "" };
+        let exitance = if matches!(self.columns.place, PlaceColumns::Plane(_)) { ",exitance" } else { "" };
         format!(",S_d{exitance}{}", if self.options.single { ",single" } else { "" })
     }
 
@@ -126,27 +125,35 @@ impl Batch {
             }
         };
         let columns = &self.columns;
+        let substance = match columns.substance {
+            SubstanceColumns::Coefficients([s, a, g]) => Substance::Coefficients {
+                sigma_s: number(s, "sigma_s")?,
+                sigma_a: number(a, "sigma_a")?,
+                g: number(g, "g")?,
+            },
+            SubstanceColumns::Profile([a, l]) => {
+                Substance::Profile { albedo: number(a, "A")?, length: number(l, "l")? }
+            }
+        };
         let medium = Inputs {
-            sigma_s: number(columns.sigma_s, "sigma_s")?,
-            sigma_a: number(columns.sigma_a, "sigma_a")?,
-            g: number(columns.g, "g")?,
-            eta: number(columns.eta, "eta")?,
+            substance,
+            eta: columns.eta.map_or(Ok(1.0), |c| number(c, "eta"))?,
             thickness: columns.thickness.map(|c| number(c, "thickness")).transpose()?,
             eta_far: columns.eta_far.map(|c| number(c, "eta_far")).transpose()?,
         };
         let place = match &columns.place {
-            Place::Plane(r) => {
-                Position::plane(number(*r, "r")?, medium.thickness.filter(|_| self.options.transmitted))?
+            PlaceColumns::Plane(r) => {
+                Place::plane(number(*r, "r")?, medium.thickness.filter(|_| self.options.transmitted))?
             }
-            Place::General(at) => {
+            PlaceColumns::General(at) => {
                 let mut v = [0.0; 12];
                 for ((value, &column), name) in v.iter_mut().zip(at).zip(GENERAL) {
                     *value = number(column, name)?;
                 }
-                Position::general(&v)?
+                Place::general(&v)?
             }
         };
-        let exitance_too = matches!(columns.place, Place::Plane(_));
+        let exitance_too = matches!(columns.place, PlaceColumns::Plane(_));
 
         let key = medium.key();
         if key != self.last || self.models.is_empty() {
@@ -159,7 +166,7 @@ impl Batch {
             self.last = key;
         }
         let prepared = &self.models[&key];
-        let s_d = prepared.s_d(&place);
+        let s_d = prepared.s_d(&place, self.options.clamped);
         out.push_str(row);
         let _ = write!(out, ",{s_d:.9e}");
         if exitance_too {
@@ -183,135 +190,26 @@ impl Columns {
                 0
             })
         };
-        let (sigma_s, sigma_a, g, eta) = (need("sigma_s"), need("sigma_a"), need("g"), need("eta"));
+        let profile = model == ModelName::Normalised && at("sigma_s").is_none() && at("A").is_some();
+        let (substance, eta) = if profile {
+            (SubstanceColumns::Profile(["A", "l"].map(&mut need)), at("eta"))
+        } else {
+            let coefficients = ["sigma_s", "sigma_a", "g"].map(&mut need);
+            (SubstanceColumns::Coefficients(coefficients), Some(need("eta")))
+        };
         let place = if GENERAL.iter().any(|name| at(name).is_some()) && at("r").is_none() {
-            Place::General(GENERAL.map(&mut need))
+            PlaceColumns::General(GENERAL.map(&mut need))
         } else {
             let either = at("r").map_or("r` (or `x,y,z,nix,niy,niz,nox,noy,noz,wx,wy,wz`)", |_| "r");
-            Place::Plane(need(either))
+            PlaceColumns::Plane(need(either))
         };
         let (slab, heeds) = (model == ModelName::Slab, model == ModelName::Slab || model == ModelName::Auto);
         let thickness = if slab { Some(need("thickness")) } else { at("thickness").filter(|_| heeds) };
         let eta_far = at("eta_far").filter(|_| slab);
         if missing.is_empty() {
-            return Ok(Self { sigma_s, sigma_a, g, eta, thickness, eta_far, place, count: names.len() });
+            return Ok(Self { substance, eta, thickness, eta_far, place, count: names.len() });
         }
         Err(Error::usage(format!("standard input, line 1: the header lacks {}", missing.join(", "))))
-    }
-}
-
-/// The medium of a row, as typed.
-struct Inputs {
-    sigma_s: f64,
-    sigma_a: f64,
-    g: f64,
-    eta: f64,
-    thickness: Option<f64>,
-    eta_far: Option<f64>,
-}
-
-impl Inputs {
-    fn key(&self) -> [u64; 6] {
-        let far = [self.thickness, self.eta_far].map(|v| v.unwrap_or(0.0));
-        [self.sigma_s, self.sigma_a, self.g, self.eta, far[0], far[1]].map(f64::to_bits)
-    }
-
-    fn prepare(&self, options: BatchOptions) -> Result<Prepared> {
-        for (name, value) in [("sigma_s", self.sigma_s), ("sigma_a", self.sigma_a)] {
-            if value < 0.0 {
-                return Err(Error::scene(format!("{name} = {value} is negative")));
-            }
-        }
-        if let Some(thickness) = self.thickness.filter(|t| *t <= 0.0) {
-            return Err(Error::scene(format!("thickness = {thickness} is not positive")));
-        }
-        let sigma_t_prime = self.sigma_s * (1.0 - self.g) + self.sigma_a;
-        let length = if sigma_t_prime > 0.0 { (-sigma_t_prime.log2()).round().exp2() } else { 1.0 };
-        let per_length = |sigma: f64| Rgb::splat((sigma * length) as f32);
-        let medium = Medium {
-            sigma_a: per_length(self.sigma_a),
-            sigma_s: per_length(self.sigma_s),
-            g: self.g,
-            eta: self.eta as f32,
-        }
-        .checked()?;
-        let thickness = self.thickness.map(|t| (t / length) as f32);
-        let eta_far = self.eta_far.unwrap_or(self.eta);
-        let normalised = options.exit_normalisation;
-        let model = match (options.model, thickness) {
-            (ModelName::Directional, _) => Model::Directional(DirectionalDipole::new(&medium, options.calibrated)),
-            (ModelName::Beam, _) => Model::Beam(PhotonBeamDiffusion::new(&medium, normalised, options.kappa)),
-            (ModelName::Slab, Some(thickness)) => {
-                Model::Slab(Box::new(Slab::between(&medium, thickness, eta_far as f32, normalised)?))
-            }
-            (name, thickness) => Model::with_thickness(name, &medium, thickness, normalised)?,
-        };
-        // The directional dipole has the factor as published.
-        let normalised = normalised || model.name() == ModelName::Directional;
-        let eta = if options.transmitted { eta_far } else { self.eta };
-        let exit = if normalised { FresnelMoments::new(eta).four_c_phi_outside } else { 1.0 };
-        let single = SingleChannel::new(&ChannelMedium {
-            sigma_s: self.sigma_s * length,
-            sigma_a: self.sigma_a * length,
-            g: self.g,
-            eta: self.eta,
-        });
-        Ok(Prepared { model, length, exit_factor: std::f64::consts::PI * exit, single })
-    }
-}
-
-/// Entry and exit of a row, in the row's unit.
-struct Position {
-    x: [f64; 3],
-    n_i: Vec3,
-    n_o: Vec3,
-    w: Vec3,
-}
-
-impl Position {
-    /// On the lit plane, or on the far face of a slab as thick as `through`.
-    fn plane(r: f64, through: Option<f64>) -> Result<Self> {
-        if r < 0.0 {
-            return Err(Error::scene(format!("r = {r} is negative")));
-        }
-        let n_o = if through.is_some() { -Vec3::Z } else { Vec3::Z };
-        Ok(Self { x: [r, 0.0, -through.unwrap_or(0.0)], n_i: Vec3::Z, n_o, w: -Vec3::Z })
-    }
-
-    fn general(v: &[f64; 12]) -> Result<Self> {
-        let vector = |k: usize| [v[k], v[k + 1], v[k + 2]];
-        let unit = |k: usize, name: &str| {
-            let a = vector(k);
-            let length = a.iter().map(|c| c * c).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > UNIT_TOLERANCE {
-                return Err(Error::scene(format!("{name} has length {length}, not 1")));
-            }
-            Ok(Vec3::from(a.map(|c| c as f32)))
-        };
-        Ok(Self { x: vector(0), n_i: unit(3, "nix,niy,niz")?, n_o: unit(6, "nox,noy,noz")?, w: unit(9, "wx,wy,wz")? })
-    }
-}
-
-impl Prepared {
-    /// S_d [1/(unit² sr)] in the row's unit.
-    fn s_d(&self, place: &Position) -> f64 {
-        struct Eval(Entry, Exit);
-        impl ModelVisitor for Eval {
-            type Out = Rgb;
-            fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-                model.eval(&self.0, &self.1)
-            }
-        }
-        let x = Vec3::from(place.x.map(|c| (c / self.length) as f32));
-        let entry = Entry { x: Vec3::ZERO, n: place.n_i, w: place.w };
-        let exit = Exit { x, n: place.n_o, w: place.n_o };
-        f64::from(self.model.visit(Eval(entry, exit))[0]) / (self.length * self.length)
-    }
-
-    /// Exitance by single scattering on the plane through the entry [1/unit²].
-    fn single(&self, place: &Position) -> f64 {
-        let x = DVec3::from(place.x) / self.length;
-        self.single.exitance(x, place.n_i.as_dvec3(), place.w.as_dvec3()) / (self.length * self.length)
     }
 }
 
@@ -448,6 +346,41 @@ mod tests {
             last(&run_with(options, "sigma_s,sigma_a,g,eta,r", &[&row]).unwrap()[0]) / (unit * unit)
         });
         assert!(mm > 0.0 && (m / mm - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn albedo_and_length_stand_for_coefficients() {
+        let mut options = BatchOptions::new(ModelName::Normalised);
+        // A (exp(-r/d) + exp(-r/3d)) / (8π d r) with d = l / s(A).
+        for (fit, s) in
+            [(WidthFit::Searchlight, 1.539), (WidthFit::Diffuse, 1.715), (WidthFit::DiffusionLength, 3.583_521)]
+        {
+            options.width = fit;
+            let (a, l, r) = (0.5, 2e-5_f64, 1e-5);
+            let out = last(&run_with(options, "A,l,r", &[&format!("{a},{l},{r}")]).unwrap()[0]);
+            let d: f64 = l / s;
+            let expected = a * ((-r / d).exp() + (-r / (3.0 * d)).exp()) / (8.0 * std::f64::consts::PI * d * r);
+            assert!((out / expected - 1.0).abs() < 1e-5, "{fit:?}: {out} {expected}");
+        }
+        assert!(run_with(options, "A,r", &[]).unwrap_err().to_string().contains("lacks `l`"));
+        assert!(run_with(options, "A,l,r", &["1.5,1,1"]).unwrap_err().to_string().contains("albedo 1.5"));
+        options.single = true;
+        assert!(run_with(options, "A,l,r", &[]).is_err());
+    }
+
+    #[test]
+    fn negative_values_of_a_formula_are_printed_unless_clamped() {
+        // Far out between unlike boundaries, and an exit where the image outweighs the source.
+        let slab = ("sigma_s,sigma_a,g,eta,r,thickness,eta_far", "1,0.0001,0,2.5,5,1.5,1.5");
+        let header = format!("sigma_s,sigma_a,g,eta,{}", GENERAL.join(","));
+        let directional = (header.as_str(), "0.01,0.032,0,1,-12,0,0,0,0,1,0,0,1,0.932039,0,-0.362358");
+        for (model, (header, row)) in [(ModelName::Slab, slab), (ModelName::Directional, directional)] {
+            let mut options = BatchOptions::new(model);
+            let signed = last(&run_with(options, header, &[row]).unwrap()[0]);
+            options.clamped = true;
+            let clamped = last(&run_with(options, header, &[row]).unwrap()[0]);
+            assert!(signed < 0.0 && clamped == 0.0, "{model:?}: {signed} {clamped}");
+        }
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! against the Monte Carlo truth) with `plot.rs` (the SVG writer); `batch.rs` evaluates the rows of a CSV.
 
 mod batch;
+mod batch_model;
 mod monte_carlo;
 mod plot;
 mod profile;

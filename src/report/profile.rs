@@ -5,7 +5,7 @@ use super::monte_carlo::{Bin, Run, channel_run};
 use super::plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
 use crate::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit, SingleChannel};
 use crate::math::{DVec3, Vec3};
-use crate::optics::{Boundary, ChannelOptics, FresnelMoments, Measured, Medium};
+use crate::optics::{ChannelOptics, FresnelMoments, HalfSpace, Measured, Medium};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -94,7 +94,7 @@ impl Profile {
 
     /// Total reflectance of channel `c`: the transfer equation for isotropic scattering with the reduced coefficients.
     pub fn reference_total(&self, c: usize) -> f64 {
-        Boundary::new(f64::from(self.medium.eta)).reflectance(self.optics()[c].absorbed_prime)
+        HalfSpace::new(f64::from(self.medium.eta)).reflectance(self.optics()[c].absorbed_prime)
     }
 
     fn optics(&self) -> [ChannelOptics; 3] {

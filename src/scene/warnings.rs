@@ -3,6 +3,7 @@
 use super::file::SceneFile;
 use super::options::MethodName;
 use super::{Scene, Surface, Translucent};
+use crate::optics::{ChannelOptics, Trust};
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
@@ -29,17 +30,29 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
     }
 }
 
-/// Where the medium leaves the range of diffusion theory.
+/// Where the medium leaves the range of diffusion theory, by the chart of `optics`.
 fn outside_diffusion(t: &Translucent) -> Option<String> {
-    let (alpha, sigma) = (t.medium.alpha_prime(), t.medium.sigma_t_prime());
+    let (optics, sigma) = (ChannelOptics::of(&t.medium), t.medium.sigma_t_prime());
     let empty: Vec<&str> = (0..3).filter(|&c| sigma[c] <= 0.0).map(|c| CHANNELS[c]).collect();
     if !empty.is_empty() {
         return Some(format!("no scattering and no absorption in {}: no light comes back there", empty.join(", ")));
     }
-    let low: Vec<String> =
-        (0..3).filter(|&c| alpha[c] < 0.5).map(|c| format!("{:.3} in {}", alpha[c], CHANNELS[c])).collect();
-    (!low.is_empty()).then(|| {
-        format!("reduced albedo {}, below 0.5: outside diffusion theory, a BSSRDF model errs; trace it", low.join(", "))
+    let low: Vec<String> = (0..3)
+        .filter(|&c| optics[c].outside_diffusion())
+        .map(|c| format!("{:.3} in {}", optics[c].alpha_prime, CHANNELS[c]))
+        .collect();
+    if !low.is_empty() {
+        let low = low.join(", ");
+        return Some(format!(
+            "reduced albedo {low}, below 0.5: outside diffusion theory, a BSSRDF model errs; trace it"
+        ));
+    }
+    (Trust::of(&optics) == Trust::PathTracing).then(|| {
+        let albedo = optics.map(|k| format!("{:.3}", k.alpha)).join(", ");
+        format!(
+            "g = {:.3} with albedo {albedo}: light goes on too straight for a BSSRDF model, which errs; trace it",
+            t.medium.g
+        )
     })
 }
 

@@ -1,7 +1,7 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
 use super::Camera;
-use crate::bssrdf::{DirectionalDipole, Model, ModelName};
+use crate::bssrdf::{DirectionalDipole, Model, ModelName, choose};
 use crate::error::Result;
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Rgb};
@@ -101,5 +101,15 @@ impl Translucent {
             return Ok(Model::Directional(DirectionalDipole::new(&self.medium, true)));
         }
         Model::with_thickness(self.model, &self.medium, self.thickness, self.exit_normalisation)
+    }
+
+    /// The model as logs and file headers name it: with its variant, and for `auto` the choice and the reason.
+    pub fn model_text(&self) -> String {
+        match self.model {
+            ModelName::Auto => choose(&self.medium, self.thickness).to_string(),
+            ModelName::Directional if self.calibrated => "directional (calibrated)".into(),
+            ModelName::Slab => format!("slab ({} unit thick)", self.thickness.unwrap_or(f32::NAN)),
+            name => name.name().into(),
+        }
     }
 }

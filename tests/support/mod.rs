@@ -1,7 +1,11 @@
-//! Reference tables: reading them, and the bar that models are held to.
+//! Reference tables: reading them, and the bar that models are held to. Media and directions for tests of models.
 #![allow(dead_code)] // each test file uses its part
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
+use marmor::bssrdf::ChannelMedium;
+use marmor::math::{Rgb, Vec3};
+use marmor::optics::Medium;
+use proptest::prelude::*;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -46,6 +50,71 @@ pub fn table(name: &str) -> Vec<Row> {
 /// where the variable is not set.
 pub fn whole_table(name: &str) -> Option<Vec<Row>> {
     std::env::var_os("MARMOR_REFERENCE_DIR").map(|folder| read(&Path::new(&folder).join(name)))
+}
+
+/// Runs `check` on the committed rows of `file`, and on the whole table where there is one.
+pub fn both(file: &str, check: impl Fn(&str, &[Row])) {
+    check(file, &table(file));
+    if let Some(rows) = whole_table(file) {
+        check(&format!("whole {file}"), &rows);
+    }
+}
+
+/// The medium of a row. Tables of models that see reduced scattering only have `sigma_s_red`: g = 0.
+pub fn channel(row: &Row) -> ChannelMedium {
+    let reduced = row.has("sigma_s_red");
+    ChannelMedium {
+        sigma_s: row.number(if reduced { "sigma_s_red" } else { "sigma_s" }),
+        sigma_a: row.number("sigma_a"),
+        g: if reduced { 0.0 } else { row.number("g") },
+        eta: row.number("eta"),
+    }
+}
+
+/// The same medium in three channels; nothing is checked.
+pub fn grey(sigma_s: f32, sigma_a: f32, g: f64, eta: f32) -> Medium {
+    Medium { sigma_s: Rgb::splat(sigma_s), sigma_a: Rgb::splat(sigma_a), g, eta }
+}
+
+/// Unit vectors.
+pub fn direction() -> impl Strategy<Value = Vec3> {
+    (-1.0_f32..=1.0, 0.0_f32..6.3).prop_map(|(z, phi)| {
+        let s = (1.0 - z * z).max(0.0).sqrt();
+        Vec3::new(s * phi.cos(), s * phi.sin(), z)
+    })
+}
+
+/// A pair of points and a medium, anything that a caller may ask.
+#[derive(Debug)]
+pub struct AnyInput {
+    pub medium: Medium,
+    /// Exit minus entry.
+    pub x: Vec3,
+    pub w: Vec3,
+    pub n_i: Vec3,
+    pub n_o: Vec3,
+}
+
+/// Coefficients and distances over 12 and 30 decades, and the degenerate cases: nothing absorbs, nothing scatters, the
+/// same point, an exit straight below the entry, one on the ray.
+pub fn any_input() -> impl Strategy<Value = AnyInput> {
+    let media = (-14.0_f32..14.0, -14.0_f32..14.0, -0.99_f64..0.999_999_9, 0.4_f32..4.0);
+    (media, [direction(), direction(), direction(), direction()], -40.0_f32..30.0, 0..7).prop_map(
+        |((log_s, log_a, g, eta), [x, w, n_i, n_o], log_r, case)| {
+            let mut medium = grey(log_s.exp(), log_a.exp(), g, eta);
+            let mut x = x * log_r.exp();
+            match case {
+                0 => medium.sigma_a = Rgb::BLACK,
+                1 => medium.sigma_s = Rgb::BLACK,
+                2 => x = Vec3::ZERO,
+                3 => x = n_i * log_r.exp(),
+                4 => x = w * log_r.exp(),
+                _ => {}
+            }
+            medium.sigma_a.0[1] *= 3.0;
+            AnyInput { medium, x, w, n_i, n_o }
+        },
+    )
 }
 
 /// Relative errors of f32 results against a table.
