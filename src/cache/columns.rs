@@ -3,7 +3,6 @@
 use super::CachedSample;
 use crate::bssrdf::{Bssrdf, DirectionColumns, Entry, EntryColumns, Exit, Model, SourceColumns};
 use crate::math::Vec3;
-use std::ops::Range;
 
 /// Columns a model may need: point, weight, and two of a source or six of directions.
 const MOST: usize = 12;
@@ -22,9 +21,9 @@ impl Columns {
     /// Empty columns for `model`.
     pub fn new(model: &Model) -> Self {
         let used = match model {
-            Model::Standard(_) | Model::Better(_) | Model::Normalised(_) | Model::Slab(_) => LEAST,
+            Model::Standard(_) | Model::Better(_) | Model::Normalised(_) => LEAST,
             Model::Beam(_) => LEAST + 2,
-            Model::Directional(_) => LEAST + 6,
+            Model::Directional(_) | Model::Slab(_) => LEAST + 6,
         };
         Self { columns: std::array::from_fn(|_| Vec::new()), used }
     }
@@ -56,7 +55,7 @@ impl Columns {
                 }
                 row[LEAST..LEAST + 2].copy_from_slice(&[(-w.dot(n) * t).max(0.0), t]);
             }
-            Model::Directional(_) => row[LEAST..].copy_from_slice(&[n.x, n.y, n.z, w.x, w.y, w.z]),
+            Model::Directional(_) | Model::Slab(_) => row[LEAST..].copy_from_slice(&[n.x, n.y, n.z, w.x, w.y, w.z]),
             _ => {}
         }
         for (column, value) in self.columns[..self.used].iter_mut().zip(row) {
@@ -101,26 +100,15 @@ impl Columns {
         Self { columns, used: self.used }
     }
 
-    /// Forgets all samples and keeps the memory.
-    pub fn clear(&mut self) {
-        for column in &mut self.columns[..self.used] {
-            column.clear();
-        }
-    }
-
-    /// Takes the samples `range` of `other`, columns of the same model.
-    #[inline]
-    pub fn extend(&mut self, other: &Self, range: Range<usize>) {
-        for (column, from) in self.columns[..self.used].iter_mut().zip(&other.columns) {
-            column.extend_from_slice(&from[range.clone()]);
-        }
-    }
-
-    /// Takes sample `i` of `other`, columns of the same model, with `factor` times its weight.
-    #[inline]
-    pub fn push(&mut self, other: &Self, i: usize, factor: f32) {
+    /// Becomes the samples `picked` of `other`, columns of the same model, each with a factor on its weight.
+    pub fn pick(&mut self, other: &Self, picked: &[(u32, f32)]) {
         for (k, (column, from)) in self.columns[..self.used].iter_mut().zip(&other.columns).enumerate() {
-            column.push(if (3..6).contains(&k) { from[i] * factor } else { from[i] });
+            column.clear();
+            if (3..LEAST).contains(&k) {
+                column.extend(picked.iter().map(|&(i, factor)| from[i as usize] * factor));
+            } else {
+                column.extend(picked.iter().map(|&(i, _)| from[i as usize]));
+            }
         }
     }
 
@@ -141,18 +129,18 @@ impl Columns {
                 dipole.gather(exit.x, exit.n, entries, directions)
             }
             Model::Slab(slab) => self.plain(&**slab, exit),
-            // The others have vectorised sums.
-            Model::Standard(model) => self.plain(model, exit),
-            Model::Better(model) => self.plain(model, exit),
-            Model::Normalised(model) => self.plain(model, exit),
+            // Those that know the distance alone have been summed above.
+            Model::Standard(_) | Model::Better(_) | Model::Normalised(_) => [0.0; 3],
         }
     }
 
-    /// A loop over pairs, for models of the distance alone.
+    /// A loop over pairs, for models with columns of normals and directions and no vectorised sum.
     fn plain<B: Bssrdf>(&self, model: &B, exit: &Exit) -> [f64; 3] {
-        let mut sum = [0.0; 3];
+        let (mut sum, c) = ([0.0; 3], &self.columns);
+        let vector = |k: usize, i: usize| Vec3::new(c[k][i], c[k + 1][i], c[k + 2][i]);
         for i in 0..self.len() {
-            let s = model.eval(&Entry { x: self.point(i), n: exit.n, w: -exit.n }, exit);
+            let entry = Entry { x: self.point(i), n: vector(LEAST, i), w: vector(LEAST + 3, i) };
+            let s = model.eval(&entry, exit);
             let weight = self.weight(i);
             for c in 0..3 {
                 sum[c] += f64::from(s[c] * weight[c]);

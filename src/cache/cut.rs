@@ -2,10 +2,26 @@
 
 use super::{Columns, Envelope, Node, Tree};
 use crate::bssrdf::{Exit, Model};
-use crate::math::hash;
+use crate::math::{Vec4, hash};
 
 /// A node whose members spread over less than this share of its distance counts as a point when the sum is guessed.
-const GUESS: f32 = 0.35;
+const GUESS: f32 = 0.5;
+
+/// Working space of [`cut`], for one model.
+pub struct Buffer {
+    columns: Columns,
+    /// Samples to evaluate, and factors on their weights.
+    picked: Vec<(u32, f32)>,
+    /// Nodes for which one member stands.
+    far: Vec<u32>,
+}
+
+impl Buffer {
+    /// Empty.
+    pub fn new(model: &Model) -> Self {
+        Self { columns: Columns::new(model), picked: Vec::new(), far: Vec::new() }
+    }
+}
 
 /// What the sum over a tree cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -20,7 +36,7 @@ pub struct CutWork {
 /// with probability proportional to its weight stands for every other node of the cut. `error` is the largest share of
 /// the whole sum that the standard deviation of one node may have. `key` seeds the draws; `buffer` is working space.
 ///
-/// A node's standard deviation is taken as |dS_d/dr| × spread × weight, at its near side. The sum itself is guessed from
+/// A node's standard deviation is taken as |dS_d/dr| × spread × weight at its near side, and what its members' colours add. The sum itself is guessed from
 /// centres. Both decide only which nodes are opened and do not depend on the draws, so that the mean is exact.
 pub fn cut(
     tree: &Tree,
@@ -29,53 +45,54 @@ pub fn cut(
     exit: &Exit,
     error: f32,
     key: u64,
-    buffer: &mut Columns,
+    buffer: &mut Buffer,
 ) -> ([f64; 3], CutWork) {
     let mut work = CutWork::default();
     let guess = guess(tree, envelope, exit, &mut work);
     // Channels without light must not open anything.
-    let limit = guess.map(|g| if g > 0.0 { 1.0 / (error * g) } else { 0.0 });
-    buffer.clear();
+    let limit = Vec4::from_array(guess.to_array().map(|g| if g > 0.0 { 1.0 / (error * g) } else { 0.0 }));
+    buffer.picked.clear();
+    buffer.far.clear();
     let mut at = 0;
     while let Some(node) = tree.nodes.get(at) {
         work.nodes += 1;
-        let open = opens(node, envelope, exit, &limit);
+        let open = opens(node, envelope, exit, limit);
         if open && node.is_leaf() {
-            buffer.extend(&tree.columns, node.first as usize..(node.first + node.count) as usize);
+            buffer.picked.extend((node.first..node.first + node.count).map(|i| (i, 1.0)));
             at += 1;
         } else if open {
             at += 1;
         } else {
-            if let Some((member, factor)) = tree.draw(node, uniform(key, at)) {
-                buffer.push(&tree.columns, member, factor);
-            }
+            buffer.far.push(at as u32);
             at = node.skip as usize;
         }
     }
-    work.evaluated = buffer.len() as u64;
-    (buffer.sum(model, exit), work)
+    // One after the other, so that their visits to memory overlap.
+    for &at in &buffer.far {
+        buffer.picked.extend(tree.draw(&tree.nodes[at as usize], uniform(key, at as usize)));
+    }
+    work.evaluated = buffer.picked.len() as u64;
+    buffer.columns.pick(&tree.columns, &buffer.picked);
+    (buffer.columns.sum(model, exit), work)
 }
 
 /// True if one member may not stand for the node.
 #[inline]
-fn opens(node: &Node, envelope: &Envelope, exit: &Exit, limit: &[f32; 4]) -> bool {
+fn opens(node: &Node, envelope: &Envelope, exit: &Exit, limit: Vec4) -> bool {
     let d2 = node.centre.distance_squared(exit.x);
     let near = d2.sqrt() - node.reach;
     if near <= 0.0 {
         return true;
     }
     let fall = envelope.at(near * near);
-    let mut worst = 0.0_f32;
-    for c in 0..4 {
-        let deviation = (fall.slope[c] * node.spread + fall.value[c] * envelope.other) * node.weight[c];
-        worst = worst.max(deviation * limit[c]);
-    }
-    worst > 1.0
+    let relative = fall.slope * node.spread + fall.value * envelope.other;
+    let deviation = relative * node.weight + fall.value * node.uneven;
+    (deviation * limit).cmpgt(Vec4::ONE).any()
 }
 
 /// The sum from centres of nodes, good to some ten percent.
-fn guess(tree: &Tree, envelope: &Envelope, exit: &Exit, work: &mut CutWork) -> [f32; 4] {
-    let mut sum = [0.0_f32; 4];
+fn guess(tree: &Tree, envelope: &Envelope, exit: &Exit, work: &mut CutWork) -> Vec4 {
+    let mut sum = Vec4::ZERO;
     let mut at = 0;
     while let Some(node) = tree.nodes.get(at) {
         work.nodes += 1;
@@ -86,9 +103,7 @@ fn guess(tree: &Tree, envelope: &Envelope, exit: &Exit, work: &mut CutWork) -> [
             continue;
         }
         let fall = envelope.at(d2 + s2);
-        for c in 0..4 {
-            sum[c] += fall.value[c] * node.weight[c];
-        }
+        sum += fall.value * node.weight;
         at = node.skip as usize;
     }
     sum

@@ -2,6 +2,7 @@
 //! depends on it, never its mean.
 
 use crate::bssrdf::{BetterDipole, Model, Radial};
+use crate::math::Vec4;
 use crate::optics::Medium;
 
 /// Table rows per octave of r².
@@ -15,9 +16,9 @@ const EXPONENTS: std::ops::Range<u32> = 67..187;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Fall {
     /// S_d per channel; the fourth is 0.
-    pub value: [f32; 4],
+    pub value: Vec4,
     /// -dS_d/dr per channel [value/unit]; the fourth is 0.
-    pub slope: [f32; 4],
+    pub slope: Vec4,
 }
 
 /// [`Fall`] by distance.

@@ -1,6 +1,6 @@
 //! The estimators by name: what each prepares once a pass, and the sum at an exit.
 
-use super::{Cache, Columns, Envelope, GatherTally, Tree, cut, notes};
+use super::{Buffer, Cache, Columns, Envelope, GatherTally, Tree, cut, notes};
 use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
 use crate::math::Rgb;
 use crate::scene::Estimator;
@@ -24,16 +24,15 @@ enum Prepared {
 /// Working space of one task, for one model after the other.
 #[derive(Default)]
 pub struct Scratch {
-    /// Empty columns by the number of columns.
-    buffers: Vec<(std::mem::Discriminant<Model>, Columns)>,
+    buffers: Vec<(std::mem::Discriminant<Model>, Buffer)>,
 }
 
 impl Scratch {
-    fn columns(&mut self, model: &Model) -> &mut Columns {
+    fn buffer(&mut self, model: &Model) -> &mut Buffer {
         let kind = std::mem::discriminant(model);
         let found = self.buffers.iter().position(|(k, _)| *k == kind);
         let at = found.unwrap_or_else(|| {
-            self.buffers.push((kind, Columns::new(model)));
+            self.buffers.push((kind, Buffer::new(model)));
             self.buffers.len() - 1
         });
         &mut self.buffers[at].1
@@ -71,7 +70,7 @@ impl Gatherer {
                 columns.sum(model, exit)
             }
             Prepared::Cut(tree) => {
-                let (sum, work) = cut(tree, model, envelope, exit, self.error, key, scratch.columns(model));
+                let (sum, work) = cut(tree, model, envelope, exit, self.error, key, scratch.buffer(model));
                 tally.nodes += work.nodes;
                 tally.pairs += work.evaluated;
                 tally.evaluated += work.evaluated;

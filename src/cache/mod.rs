@@ -12,7 +12,7 @@ mod tree;
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
 pub use columns::Columns;
-pub use cut::{CutWork, cut};
+pub use cut::{Buffer, CutWork, cut};
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Gatherer, Scratch};
 pub use fill::Filler;

@@ -1,14 +1,14 @@
 //! A binary tree over the samples of one pass, split at medians, in the order in which it is walked.
 
 use super::Columns;
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 
 /// Samples of a leaf, but for the last.
 pub const LEAF: usize = 8;
 /// Subtrees of fewer samples are built by one task.
 const TASK: usize = 4096;
 
-/// Samples `first..first + count` of the tree's columns. 52 bytes.
+/// Samples `first..first + count` of the tree's columns. 80 bytes.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Node {
     /// Mean position, weighted as members are drawn [unit].
@@ -18,7 +18,9 @@ pub struct Node {
     /// Root mean square distance from the centre, weighted as members are drawn [unit].
     pub spread: f32,
     /// Sum of the members' weights per channel; the fourth is 0.
-    pub weight: [f32; 4],
+    pub weight: Vec4,
+    /// Standard deviation of what a drawn member's weight makes of that sum: 0 where all members have one colour.
+    pub uneven: Vec4,
     /// First member.
     pub first: u32,
     /// Number of members.
@@ -44,8 +46,6 @@ pub struct Tree {
     /// Sum over all samples before each, and over all, of what a member is drawn with: the weights of the channels, each
     /// in units of its own mean.
     cumulative: Vec<f64>,
-    /// For each of as many equal parts of the total as there are samples, the sample in which it begins.
-    guide: Vec<u32>,
 }
 
 impl Tree {
@@ -75,23 +75,14 @@ impl Tree {
             sum += importance(columns.weight(i));
             cumulative.push(sum);
         }
-        let mut guide = Vec::with_capacity(count);
-        let mut i = 0;
-        for part in 0..count {
-            let begin = sum * part as f64 / count as f64;
-            while i + 1 < count && cumulative[i + 1] <= begin {
-                i += 1;
-            }
-            guide.push(i as u32);
-        }
-        let mut tree = Self { columns, nodes, cumulative, guide };
+        let mut tree = Self { columns, nodes, cumulative };
         tree.measure();
         tree
     }
 
     /// Bytes of nodes, tables and columns.
     pub fn bytes(&self) -> usize {
-        self.columns.bytes() + self.nodes.len() * size_of::<Node>() + self.guide.len() * 12
+        self.columns.bytes() + self.nodes.len() * size_of::<Node>() + self.cumulative.len() * size_of::<f64>()
     }
 
     /// Centres, sizes and sums of all nodes, from the leaves up.
@@ -103,7 +94,11 @@ impl Tree {
             let mut own = Moments::default();
             if node.is_leaf() {
                 for i in first..end {
-                    own.take(self.columns.point(i), self.columns.weight(i), self.cumulative[i + 1] - self.cumulative[i]);
+                    own.take(
+                        self.columns.point(i),
+                        self.columns.weight(i),
+                        self.cumulative[i + 1] - self.cumulative[i],
+                    );
                 }
             } else {
                 let (left, right) = (at + 1, self.nodes[at + 1].skip as usize);
@@ -118,7 +113,10 @@ impl Tree {
             // Of the box: cheap, and at most √3 too far.
             let corner = |k: usize| (own.upper[k] - centre[k]).max(centre[k] - own.lower[k]);
             node.reach = (0..3).map(|k| corner(k).powi(2)).sum::<f64>().sqrt() as f32;
-            node.weight = std::array::from_fn(|c| if c < 3 { own.weight[c] as f32 } else { 0.0 });
+            let [r, g, b] = own.weight.map(|w| w as f32);
+            node.weight = Vec4::new(r, g, b, 0.0);
+            let [r, g, b] = [0, 1, 2].map(|c| own.uneven(c) as f32);
+            node.uneven = Vec4::new(r, g, b, 0.0);
             self.nodes[at] = node;
         }
     }
@@ -126,24 +124,22 @@ impl Tree {
     /// The member of `node` at `u` in [0, 1), drawn with probability proportional to its weight, and the inverse of the
     /// probability. `None` where no member weighs anything.
     #[inline]
-    pub fn draw(&self, node: &Node, u: f64) -> Option<(usize, f32)> {
+    pub fn draw(&self, node: &Node, u: f64) -> Option<(u32, f32)> {
         let (first, end) = (node.first as usize, (node.first + node.count) as usize);
         let (begin, mass) = (self.cumulative[first], self.cumulative[end] - self.cumulative[first]);
         if mass <= 0.0 {
             return None;
         }
         let goal = begin + u * mass;
-        let part = (goal / self.cumulative[self.guide.len()] * self.guide.len() as f64) as usize;
-        let mut i = (self.guide[part.min(self.guide.len() - 1)] as usize).clamp(first, end - 1);
-        // The part's own beginning is rounded: it may be one sample late.
-        while i > first && self.cumulative[i] > goal {
-            i -= 1;
-        }
-        while i + 1 < end && self.cumulative[i + 1] <= goal {
-            i += 1;
+        // The last member that begins at or before `goal`, by bisection without branches to be mispredicted.
+        let (mut i, mut size) = (first, end - first);
+        while size > 1 {
+            let half = size / 2;
+            i = if self.cumulative[i + half] <= goal { i + half } else { i };
+            size -= half;
         }
         let own = self.cumulative[i + 1] - self.cumulative[i];
-        (own > 0.0).then_some((i, (mass / own) as f32))
+        (own > 0.0).then_some((i as u32, (mass / own) as f32))
     }
 }
 
@@ -175,10 +171,8 @@ fn split(points: &mut [(Vec3, u32)], nodes: &mut [Node], at: u32, first: u32) {
     let (left, right) = points.split_at_mut(middle);
     let (left_nodes, right_nodes) = below.split_at_mut(nodes_of(middle));
     let right_at = at + 1 + left_nodes.len() as u32;
-    let mut halves = (
-        || split(left, left_nodes, at + 1, first),
-        || split(right, right_nodes, right_at, first + middle as u32),
-    );
+    let mut halves =
+        (|| split(left, left_nodes, at + 1, first), || split(right, right_nodes, right_at, first + middle as u32));
     if large {
         rayon::join(halves.0, halves.1);
     } else {
@@ -196,13 +190,15 @@ struct Moments {
     lower: [f64; 3],
     upper: [f64; 3],
     weight: [f64; 3],
+    /// Σ weight² / mass.
+    squares: [f64; 3],
 }
 
 impl Default for Moments {
     fn default() -> Self {
         let zero = [0.0; 3];
         let (lower, upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        Self { mass: 0.0, first: zero, second: zero, lower, upper, weight: zero }
+        Self { mass: 0.0, first: zero, second: zero, lower, upper, weight: zero, squares: zero }
     }
 }
 
@@ -216,6 +212,9 @@ impl Moments {
             self.lower[k] = self.lower[k].min(x);
             self.upper[k] = self.upper[k].max(x);
             self.weight[k] += f64::from(weight[k]);
+            if mass > 0.0 {
+                self.squares[k] += f64::from(weight[k]).powi(2) / mass;
+            }
         }
     }
 
@@ -227,7 +226,13 @@ impl Moments {
             self.lower[k] = self.lower[k].min(other.lower[k]);
             self.upper[k] = self.upper[k].max(other.upper[k]);
             self.weight[k] += other.weight[k];
+            self.squares[k] += other.squares[k];
         }
+    }
+
+    /// Members are drawn with probability mass / Σ mass and stand for weight · Σ mass / mass.
+    fn uneven(&self, c: usize) -> f64 {
+        (self.mass * self.squares[c] - self.weight[c] * self.weight[c]).max(0.0).sqrt()
     }
 
     fn middle(&self) -> [f64; 3] {

@@ -4,7 +4,9 @@ use marmor::bssrdf::ModelName;
 use marmor::integrator::{AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions};
 use marmor::query::Backend;
 use marmor::sampling::Points;
-use marmor::scene::{DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Surface};
+use marmor::scene::{
+    DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Surface,
+};
 use marmor::{Error, Result};
 use std::path::Path;
 
