@@ -192,6 +192,7 @@ fn subsurface(seed: u64) -> SubsurfaceOptions {
     SubsurfaceOptions {
         cache_samples: 4096,
         estimator: Estimator::Notes,
+        cut_error: 0.03,
         entry: EntrySampling::Light,
         points: Points::Sobol,
         specular: false,

@@ -372,6 +372,14 @@ impl Bssrdf for PhotonBeamDiffusion {
         Rgb::from_fn(|c| value(&self.channels[c]))
     }
 
+    fn sample_depth(&self, u: f32) -> f32 {
+        Self::sample_depth(self, u)
+    }
+
+    fn eval_cached(&self, entry: &Entry, depth: f32, exit: &Exit, rate: f32) -> Rgb {
+        self.eval_at_depth(entry, depth, exit, rate)
+    }
+
     /// The least of min(s, σ_t′): along the ray light decays as exp(-σ_t′ t), which for α′ below 0.5 is slower.
     fn decay(&self) -> f32 {
         self.decay

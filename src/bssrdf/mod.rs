@@ -70,6 +70,18 @@ pub trait Bssrdf: Sync {
     /// [`Self::decay`].
     fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb;
 
+    /// Depth along the refracted ray [unit] that a cached sample stands for, from `u` in [0, 1); 0 for models without
+    /// sources inside.
+    fn sample_depth(&self, _u: f32) -> f32 {
+        0.0
+    }
+
+    /// What a cached sample of `depth` gives: its mean over depths from [`Self::sample_depth`] is
+    /// [`Self::eval_compensated`]. Models whose S_d is an integral over depth evaluate one depth only.
+    fn eval_cached(&self, entry: &Entry, _depth: f32, exit: &Exit, rate: f32) -> Rgb {
+        self.eval_compensated(entry, exit, rate)
+    }
+
     /// Slowest decay of the three channels [1/unit]: rejection control keeps a sample at distance r with
     /// probability exp(-decay r).
     fn decay(&self) -> f32;
@@ -267,6 +279,14 @@ impl Model {
             Self::Beam(model) => model.eval(entry, exit),
             Self::Normalised(model) => model.eval(entry, exit),
             Self::Slab(model) => model.eval_signed(entry, exit),
+        }
+    }
+
+    /// [`Bssrdf::sample_depth`] of whichever model it is.
+    pub fn sample_depth(&self, u: f32) -> f32 {
+        match self {
+            Self::Beam(model) => model.sample_depth(u),
+            _ => 0.0,
         }
     }
 

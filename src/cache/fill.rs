@@ -1,7 +1,7 @@
 //! Filling the cache: random triangle by area, random point in it, a direction, what light arrives, what enters.
 
 use super::{Cache, CachedSample};
-use crate::bssrdf::Entry;
+use crate::bssrdf::{Entry, Model};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Arrival, Lights, emitted};
 use crate::math::Rgb;
@@ -24,6 +24,8 @@ pub struct Filler<'a> {
     pub object: u32,
     /// Its area table.
     pub table: &'a AreaTable,
+    /// Its BSSRDF, which says at what depth a sample stands.
+    pub model: &'a Model,
     /// Its relative index of refraction.
     pub eta: f32,
     /// How directions are picked.
@@ -65,8 +67,8 @@ impl Filler<'_> {
         let mut candidates = Vec::with_capacity(CHUNK as usize);
         for number in numbers {
             let (at, u) = self.point(number);
-            let Some(arrival) = self.arrival(&at, u) else { continue };
-            if let Some(sample) = self.transmitted(&at, &arrival) {
+            let Some(arrival) = self.arrival(&at, [u[0], u[1], u[2], u[3]]) else { continue };
+            if let Some(sample) = self.transmitted(&at, &arrival, u[4]) {
                 candidates.push((sample, arrival.shadow));
             }
         }
@@ -107,27 +109,31 @@ impl Filler<'_> {
                 None => self.lights.environment(),
             };
             if !radiance.is_black() {
-                lit.extend(self.transmitted(&at, &Arrival { w, irradiance: radiance * PI, shadow: ray }));
+                lit.extend(self.transmitted(&at, &Arrival { w, irradiance: radiance * PI, shadow: ray }, u[4]));
             }
         }
         lit
     }
 
-    /// Point number `number` of the surface, flat as the triangle it lies on, and four numbers for the light.
-    fn point(&self, number: u64) -> (SurfacePoint, [f32; 4]) {
+    /// Point number `number` of the surface, flat as the triangle it lies on, four numbers for the light and one for the depth.
+    fn point(&self, number: u64) -> (SurfacePoint, [f32; 5]) {
         let (pick, u) = self.stream.numbers(number);
         let at = self.table.sample(pick, [u[0], u[1]]);
         let mut point = self.scene.objects[self.object as usize].mesh.point(at.triangle, at.u, at.v);
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         point.n = point.n_geometric;
-        (point, [u[2], u[3], u[4], u[5]])
+        (point, [u[2], u[3], u[4], u[5], u[6]])
     }
 
     /// Refracts an arrival into the medium; `None` where it is totally reflected.
-    fn transmitted(&self, at: &SurfacePoint, arrival: &Arrival) -> Option<CachedSample> {
+    fn transmitted(&self, at: &SurfacePoint, arrival: &Arrival, u: f32) -> Option<CachedSample> {
         let w = refract(arrival.w, at.n, self.eta)?;
         let t12 = transmittance(self.eta, arrival.w.dot(at.n));
         let flux: Rgb = arrival.irradiance * (t12 * self.table.area() as f32);
-        (!flux.is_black()).then_some(CachedSample { entry: Entry { x: at.x, n: at.n, w }, flux })
+        (!flux.is_black()).then(|| CachedSample {
+            entry: Entry { x: at.x, n: at.n, w },
+            depth: self.model.sample_depth(u),
+            flux,
+        })
     }
 }

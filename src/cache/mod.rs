@@ -1,13 +1,23 @@
 //! Transmitted-light points of one pass on one translucent mesh, and the estimators that gather over them.
-//! Not for: what happens at the exit (`integrator/subsurface.rs`). Read first: `fill.rs`, then `notes.rs`.
+//! Not for: what happens at the exit (`integrator/subsurface.rs`). Read first: `fill.rs`, `notes.rs`, then `cut.rs`.
 
+mod columns;
+mod cut;
+mod envelope;
+mod estimate;
 mod fill;
 mod notes;
+mod tree;
 
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
+pub use columns::Columns;
+pub use cut::{Buffer, CutWork, cut};
+pub use envelope::{Envelope, Fall};
+pub use estimate::{Gatherer, Scratch};
 pub use fill::Filler;
 pub use notes::notes;
+pub use tree::{Node, Tree};
 
 /// The cached samples of one object and one pass. Samples that met no light are not stored, but count.
 pub struct Cache {
@@ -17,11 +27,14 @@ pub struct Cache {
     pub attempted: u32,
 }
 
-/// Light that has entered the medium at one point. 48 bytes.
+/// Light that has entered the medium at one point. 52 bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct CachedSample {
     /// Where and in which refracted direction.
     pub entry: Entry,
+    /// Depth along the refracted ray that the sample stands for [unit], for models with interior sources; see
+    /// [`crate::bssrdf::Bssrdf::sample_depth`].
+    pub depth: f32,
     /// L_t = T12 L_i cosθ_i / pdf · A: the flux through the whole surface that this sample stands for
     /// [radiance unit x sr x unit²]. The lecture's T12 L_i π A for a cosine-sampled direction.
     pub flux: Rgb,
@@ -36,9 +49,11 @@ pub struct GatherTally {
     pub lit: u64,
     /// Exit points gathered at.
     pub exits: u64,
+    /// Nodes of trees visited.
+    pub nodes: u64,
     /// Pairs of exit point and cached sample looked at.
     pub pairs: u64,
-    /// Pairs kept by rejection control, where S_d was evaluated.
+    /// Pairs where S_d was evaluated: those kept by rejection control, all of a plain sum, or those in a cut.
     pub evaluated: u64,
 }
 
@@ -47,6 +62,7 @@ impl std::ops::AddAssign for GatherTally {
         self.samples += other.samples;
         self.lit += other.lit;
         self.exits += other.exits;
+        self.nodes += other.nodes;
         self.pairs += other.pairs;
         self.evaluated += other.evaluated;
     }

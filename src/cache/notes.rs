@@ -15,7 +15,7 @@ pub fn notes<B: Bssrdf>(cache: &Cache, model: &B, exit: &Exit, key: u64, tally: 
         let distance = sample.entry.x.distance(exit.x);
         if chance(key, number) < f64::from((-decay * distance).exp()) {
             evaluated += 1;
-            let light = model.eval_compensated(&sample.entry, exit, decay) * sample.flux;
+            let light = model.eval_cached(&sample.entry, sample.depth, exit, decay) * sample.flux;
             for c in 0..3 {
                 sum[c] += f64::from(light[c]);
             }
@@ -51,6 +51,7 @@ mod tests {
                 n: Vec3::Z,
                 w: -Vec3::Z,
             },
+            depth: 0.0,
             flux: Rgb::from_fn(|c| 0.1 + number(i, 2 + c as u32)),
         };
         Cache { lit: (0..count).map(sample).collect(), attempted: 2 * count }

@@ -4,7 +4,9 @@ use marmor::bssrdf::ModelName;
 use marmor::integrator::{AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions};
 use marmor::query::Backend;
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Surface};
+use marmor::scene::{
+    DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Surface,
+};
 use marmor::{Error, Result};
 use std::path::Path;
 
@@ -108,7 +110,8 @@ pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
         }
     }
     let seed = file.render.seed.unwrap_or(0);
-    let estimator = file.method.estimator.unwrap_or(Estimator::Notes);
+    let default = if args.as_notes { Estimator::Notes } else { Estimator::Cut };
+    let estimator = if args.as_notes { default } else { file.method.estimator.unwrap_or(default) };
     let method = build(&scene, &file.method, args.as_notes, estimator, seed)?;
     let backend = args.backend.unwrap_or(Backend::preferred());
     Ok(Prepared { method, backend, seed, as_notes: args.as_notes, estimator, scene, file })
@@ -147,8 +150,9 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
                 (options.entry.unwrap_or(EntrySampling::Light), Points::Sobol)
             };
             let options = SubsurfaceOptions {
-                cache_samples: options.cache_samples.unwrap_or(1024),
+                cache_samples: options.cache_samples.unwrap_or(estimator.default_samples()),
                 estimator,
+                cut_error: options.cut_error.map_or(DEFAULT_CUT_ERROR, |e| e as f32),
                 entry,
                 points,
                 specular: options.specular.unwrap_or(true),

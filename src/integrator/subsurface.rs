@@ -3,8 +3,8 @@
 use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
-use crate::cache::{Cache, Filler, GatherTally, notes};
+use crate::bssrdf::{Exit, Model};
+use crate::cache::{Envelope, Filler, Gatherer, Scratch};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -21,6 +21,8 @@ pub struct SubsurfaceOptions {
     pub cache_samples: u32,
     /// How the sum over the cache is estimated.
     pub estimator: Estimator,
+    /// About the relative standard deviation that `cut` adds at each sample of a pixel.
+    pub cut_error: f32,
     /// How directions of entering light are picked.
     pub entry: EntrySampling,
     /// How points on the surface are spread.
@@ -47,6 +49,7 @@ pub struct Subsurface {
 struct Body {
     medium: Medium,
     model: Model,
+    envelope: Envelope,
     table: AreaTable,
     stream: CacheStream,
 }
@@ -61,7 +64,9 @@ impl Subsurface {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
             let stream = CacheStream::new(options.points, options.seed, index as u64);
-            Ok(Some(Body { medium: t.medium, model: t.build()?, table, stream }))
+            let model = t.build()?;
+            let envelope = Envelope::new(&model, &t.medium);
+            Ok(Some(Body { medium: t.medium, model, envelope, table, stream }))
         };
         Ok(Self {
             options,
@@ -71,11 +76,19 @@ impl Subsurface {
         })
     }
 
-    fn shade(&self, view: View<'_>, pass: &[Option<Cache>], ray: &CameraRay, hit: &Hit, tally: &mut Tally) -> Rgb {
+    fn shade(
+        &self,
+        view: View<'_>,
+        pass: &[Option<Gatherer>],
+        ray: &CameraRay,
+        hit: &Hit,
+        scratch: &mut Scratch,
+        tally: &mut Tally,
+    ) -> Rgb {
         let at = surface_point(view, hit, ray.ray.direction);
         let mut stream = ray.stream;
         let object = hit.mesh as usize;
-        let (Some(body), Some(cache)) = (&self.bodies[object], &pass[object]) else {
+        let (Some(body), Some(gatherer)) = (&self.bodies[object], &pass[object]) else {
             return emitted(view.scene, hit, ray.ray.direction)
                 + self.light.reflected(view, &at, self.albedo[object], &mut stream, tally);
         };
@@ -84,10 +97,7 @@ impl Subsurface {
         // An interpolated normal may look away from the viewer; the triangle's own never does.
         let mu = if at.n.dot(w) > 0.0 { at.n.dot(w) } else { at.n_geometric.dot(w) };
         let exit = Exit { x: at.x, n: at.n, w };
-        let gather = Gather { cache, exit: &exit, key: stream.key(), tally: &mut tally.gather };
-        let inside = match self.options.estimator {
-            Estimator::Notes => body.model.visit(gather),
-        };
+        let inside = gatherer.gather(&body.model, &body.envelope, &exit, stream.key(), scratch, &mut tally.gather);
         let mirrored = if self.options.specular {
             self.mirrored(view, &at, w, &mut stream, tally) * reflectance(eta, mu)
         } else {
@@ -120,22 +130,8 @@ fn surface_point(view: View<'_>, hit: &Hit, direction: Vec3) -> SurfacePoint {
     view.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v).facing(-direction)
 }
 
-struct Gather<'a> {
-    cache: &'a Cache,
-    exit: &'a Exit,
-    key: u64,
-    tally: &'a mut GatherTally,
-}
-
-impl ModelVisitor for Gather<'_> {
-    type Out = Rgb;
-    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-        notes(self.cache, model, self.exit, self.key, self.tally)
-    }
-}
-
 impl Integrator for Subsurface {
-    type Pass = Vec<Option<Cache>>;
+    type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
         let fill = |(object, body): (usize, &Option<Body>)| {
@@ -146,6 +142,7 @@ impl Integrator for Subsurface {
                 lights: &self.light.lights,
                 object: object as u32,
                 table: &body.table,
+                model: &body.model,
                 eta: body.medium.eta,
                 sampling: self.options.entry,
                 stream: &body.stream,
@@ -154,7 +151,7 @@ impl Integrator for Subsurface {
             let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
-            Some(cache)
+            Some(Gatherer::new(self.options.estimator, cache, &body.model, self.options.cut_error))
         };
         self.bodies.iter().enumerate().map(fill).collect()
     }
@@ -164,10 +161,11 @@ impl Integrator for Subsurface {
         let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
         view.rays.closest_batch(&camera, &mut hits);
         tally.rays.camera += rays.len() as u64;
+        let mut scratch = Scratch::default();
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(),
-                Some(hit) => self.shade(view, pass, ray, hit, tally),
+                Some(hit) => self.shade(view, pass, ray, hit, &mut scratch, tally),
             };
         }
     }

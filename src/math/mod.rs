@@ -11,7 +11,7 @@ mod simd;
 
 pub use exp::{exp2, exp2_m1, times_exp2};
 pub use frame::Frame;
-pub use glam::{DVec2, DVec3, Vec2, Vec3};
+pub use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
 pub use hash::{hash, hash_combine, unit_f32, unit_f64};
 pub use quadrature::GaussLegendre;
 pub use rgb::Rgb;

@@ -220,7 +220,18 @@ pub(super) fn switch(fields: &Fields<'_>, key: &str) -> Result<Option<bool>> {
 
 fn method(top: &Fields<'_>) -> Result<MethodOptions> {
     let Some(m) = top.table("method")? else { return Ok(MethodOptions::default()) };
-    let keys = ["name", "radius", "rays", "light_samples", "cache_samples", "estimator", "model", "entry", "specular"];
+    let keys = [
+        "name",
+        "radius",
+        "rays",
+        "light_samples",
+        "cache_samples",
+        "estimator",
+        "cut_error",
+        "model",
+        "entry",
+        "specular",
+    ];
     m.only("[method]", &keys)?;
     Ok(MethodOptions {
         name: named_value(&m, "name")?,
@@ -229,6 +240,8 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         light_samples: whole(&m, "light_samples", 1 << 16)?,
         cache_samples: whole(&m, "cache_samples", 1 << 24)?,
         estimator: named_value(&m, "estimator")?,
+        cut_error: m
+            .get("cut_error", "a number from 1e-4 to 1", |n| n.number().filter(|v| (1e-4..=1.0).contains(v)))?,
         model: named_value(&m, "model")?,
         entry: named_value(&m, "entry")?,
         specular: switch(&m, "specular")?,

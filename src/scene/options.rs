@@ -54,8 +54,27 @@ named! {
     /// How the sample cache is summed.
     Estimator, "estimator",
     /// The plain loop over all samples with rejection control.
-    Notes = "notes"
+    Notes = "notes",
+    /// The vectorised sum over all samples.
+    All = "all",
+    /// One random member stands for each far node of a tree.
+    Cut = "cut"
 }
+
+impl Estimator {
+    /// Samples per pass and translucent object unless the scene says: a pass of `cut` costs little more with many, one of
+    /// the loops costs in proportion.
+    pub fn default_samples(self) -> u32 {
+        match self {
+            Self::Notes => 1024,
+            Self::All => 4096,
+            Self::Cut => 16384,
+        }
+    }
+}
+
+/// [`MethodOptions::cut_error`] unless the scene says.
+pub const DEFAULT_CUT_ERROR: f32 = 0.03;
 
 named! {
     /// How the light arriving at a cached sample is found.
@@ -81,6 +100,8 @@ pub struct MethodOptions {
     pub cache_samples: Option<u32>,
     /// Subsurface: how the cache is summed.
     pub estimator: Option<Estimator>,
+    /// Subsurface: about the relative standard deviation that `cut` adds at each sample of a pixel, 1e-4 to 1.
+    pub cut_error: Option<f64>,
     /// Subsurface: the model of every translucent material, over the materials' own.
     pub model: Option<ModelName>,
     /// Subsurface: how light is sampled where it enters; by the scene if absent.

@@ -1,0 +1,282 @@
+//! The sample cache, one thread: filling, the lecture's loop, and what every estimator costs and adds in noise at an exit.
+//!
+//!     cargo bench --features embree --bench cache
+//!     MARMOR_BENCH_OBJ=mesh.obj cargo bench --features embree --bench cache
+//!
+//! Without a file the mesh is a closed sphere with bumps, 60 mm wide. The lines at the end tell, for each medium, model
+//! and number of samples M: time at an exit and noise against the sum over all samples, and the ratio to the lecture's
+//! loop, all estimators by turns in one run.
+#![allow(clippy::print_stdout, clippy::unwrap_used)] // a benchmark prints, and stops at what it cannot read
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use criterion::{Criterion, Throughput};
+use marmor::bssrdf::{Exit, Model, ModelName};
+use marmor::cache::{Cache, Envelope, Filler, GatherTally, Gatherer, Scratch};
+use marmor::geometry::AreaTable;
+use marmor::light::Lights;
+use marmor::math::{Rgb, hash};
+use marmor::optics::Medium;
+use marmor::query::{self, Backend, RayQuery, RayTally};
+use marmor::sampling::{CacheStream, Points};
+use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile};
+
+/// Exits that noise is measured at.
+const EXITS: u64 = 64;
+/// Estimates at each of them.
+const DRAWS: u64 = 16;
+
+/// The rendering scene of a mesh of 60 mm under a lamp behind it.
+fn scene() -> (Scene, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let object = match std::env::var("MARMOR_BENCH_OBJ") {
+        Ok(path) => {
+            std::fs::copy(path, folder.path().join("mesh.obj")).unwrap();
+            "mesh = \"mesh.obj\"\n".to_string()
+        }
+        Err(_) => {
+            std::fs::write(folder.path().join("mesh.obj"), bumps(133)).unwrap();
+            "mesh = \"mesh.obj\"\ntransform = { scale = 30 }\n".to_string()
+        }
+    };
+    let text = format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 0, 200]\nlook_at = [0, 0, 0]\nfov = 30\nresolution = [8, 8]\n\
+         [[object]]\nname = \"body\"\nmaterial = \"milk\"\n{object}\
+         [[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [0, 150, -120]\nedge_u = [50, 0, 0]\n\
+         edge_v = [0, 35, 35]\nmaterial = \"lamp\"\n\
+         [material.milk]\ntype = \"translucent\"\npreset = \"skimmilk\"\n\
+         [material.lamp]\ntype = \"emissive\"\nradiance = 10\ntwo_sided = true\n"
+    );
+    let path = folder.path().join("scene.toml");
+    std::fs::write(&path, text).unwrap();
+    (Scene::load(&SceneFile::read(&path).unwrap()).unwrap(), folder)
+}
+
+/// OBJ text of a closed sphere with bumps, about 4 `rings`² triangles.
+fn bumps(rings: u32) -> String {
+    use std::fmt::Write as _;
+    let sectors = 2 * rings;
+    let mut text = String::new();
+    for ring in 0..=rings {
+        for sector in 0..sectors {
+            let theta = std::f32::consts::PI * ring as f32 / rings as f32;
+            let phi = std::f32::consts::TAU * sector as f32 / sectors as f32;
+            let r = 1.0 + 0.15 * (5.0 * theta).sin() * (4.0 * phi).cos() * theta.sin();
+            let (x, z) = (r * theta.sin() * phi.cos(), r * theta.sin() * phi.sin());
+            writeln!(text, "v {x} {} {z}", r * theta.cos()).unwrap();
+        }
+    }
+    let at = |ring: u32, sector: u32| ring * sectors + sector % sectors + 1;
+    for ring in 0..rings {
+        for sector in 0..sectors {
+            let [a, b, c, d] = [at(ring, sector), at(ring, sector + 1), at(ring + 1, sector + 1), at(ring + 1, sector)];
+            if ring > 0 {
+                writeln!(text, "f {a} {b} {c}").unwrap();
+            }
+            if ring + 1 < rings {
+                writeln!(text, "f {a} {c} {d}").unwrap();
+            }
+        }
+    }
+    text
+}
+
+struct Bench<'a> {
+    scene: &'a Scene,
+    rays: &'a dyn RayQuery,
+    lights: &'a Lights,
+    table: &'a AreaTable,
+}
+
+impl Bench<'_> {
+    fn fill(&self, model: &Model, count: u32) -> Cache {
+        let stream = CacheStream::new(Points::Sobol, 1, 0);
+        let filler = Filler {
+            scene: self.scene,
+            rays: self.rays,
+            lights: self.lights,
+            object: 0,
+            model,
+            table: self.table,
+            eta: 1.3,
+            sampling: EntrySampling::Light,
+            stream: &stream,
+        };
+        filler.fill(0, count, &mut RayTally::default())
+    }
+
+    fn exits(&self) -> Vec<Exit> {
+        let stream = CacheStream::new(Points::Sobol, 77, 0);
+        let exit = |i| {
+            let (pick, u) = stream.numbers(i);
+            let at = self.table.sample(pick, [u[0], u[1]]);
+            let p = self.scene.objects[0].mesh.point(at.triangle, at.u, at.v);
+            Exit { x: p.x, n: p.n_geometric, w: p.n_geometric }
+        };
+        (0..EXITS).map(exit).collect()
+    }
+}
+
+/// One estimator on one cache.
+struct Entrant {
+    name: String,
+    gatherer: Gatherer,
+    seconds: f64,
+    noise: [f64; 3],
+    tally: GatherTally,
+}
+
+fn copy(cache: &Cache) -> Cache {
+    Cache { lit: cache.lit.clone(), attempted: cache.attempted }
+}
+
+/// Time and noise of all estimators on one cache, by turns.
+fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u32) {
+    let thickness = Some(60.0);
+    let model = Model::with_thickness(name, &medium.1, thickness, true).unwrap();
+    let envelope = Envelope::new(&model, &medium.1);
+    let cache = bench.fill(&model, count);
+    let lit = cache.lit.len();
+    let start = Instant::now();
+    let mut entrants: Vec<Entrant> = Vec::new();
+    let entrant = |name: String, gatherer| Entrant {
+        name,
+        gatherer,
+        seconds: f64::INFINITY,
+        noise: [0.0; 3],
+        tally: GatherTally::default(),
+    };
+    for error in [0.003, 0.01, 0.03, 0.1] {
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, error);
+        entrants.push(entrant(format!("cut {error}"), gatherer));
+    }
+    let built = start.elapsed().as_secs_f64() / 4.0;
+    for estimator in [Estimator::Notes, Estimator::All] {
+        let gatherer = Gatherer::new(estimator, copy(&cache), &model, 0.0);
+        entrants.push(entrant(estimator.name().to_string(), gatherer));
+    }
+    let exits = bench.exits();
+    let mut scratch = Scratch::default();
+    let exact: Vec<Rgb> = {
+        let all = &entrants.last().unwrap().gatherer;
+        let mut tally = GatherTally::default();
+        exits.iter().map(|e| all.gather(&model, &envelope, e, 0, &mut scratch, &mut tally)).collect()
+    };
+    let slow = count > 200_000;
+    for round in 0..if slow { 1 } else { 3 } {
+        for e in &mut entrants {
+            let plain = !e.name.starts_with("cut");
+            let draws = if plain { if slow { 1 } else { 2 } } else { DRAWS };
+            let mut squares = [0.0; 3];
+            e.tally = GatherTally::default();
+            let start = Instant::now();
+            let mut found = Vec::with_capacity((EXITS * draws) as usize);
+            for draw in 0..draws {
+                for (i, exit) in exits.iter().enumerate() {
+                    let key = hash(1 + (round * DRAWS + draw) * EXITS + i as u64);
+                    found.push(e.gatherer.gather(&model, &envelope, exit, key, &mut scratch, &mut e.tally));
+                }
+            }
+            e.seconds = e.seconds.min(start.elapsed().as_secs_f64() / found.len() as f64);
+            for (k, value) in found.iter().enumerate() {
+                for c in 0..3 {
+                    let exact = f64::from(exact[k % exits.len()][c]);
+                    squares[c] += (f64::from(value[c]) / exact - 1.0).powi(2) / found.len() as f64;
+                }
+            }
+            e.noise = squares.map(f64::sqrt);
+        }
+    }
+    let notes = entrants.iter().find(|e| e.name == "notes").unwrap().seconds;
+    println!("{} {} M = {count}, {lit} lit, prepared in {:.2} ms", medium.0, name.name(), built * 1e3);
+    for e in &entrants {
+        let per_exit = |n: u64| n as f64 / e.tally.exits as f64;
+        let [r, g, b] = e.noise.map(|n| n * 100.0);
+        println!(
+            "    {:9} {:10.2} us an exit, noise {r:6.2} {g:6.2} {b:6.2} %, {:7.1} nodes, {:8.1} evaluations, notes : this = {:.1} : 1",
+            e.name,
+            e.seconds * 1e6,
+            per_exit(e.tally.nodes),
+            per_exit(e.tally.evaluated),
+            notes / e.seconds
+        );
+    }
+}
+
+fn medium(name: &str) -> (&str, Medium) {
+    // Per mm, reduced [JMLH01].
+    let (s, a) = match name {
+        "skimmilk" => ([0.70, 1.22, 1.90], [0.0014, 0.0025, 0.0142]),
+        "wholemilk" => ([2.55, 3.21, 3.77], [0.0011, 0.0024, 0.014]),
+        "marble" => ([2.19, 2.62, 3.00], [0.0021, 0.0041, 0.0071]),
+        _ => ([0.74, 0.88, 1.01], [0.032, 0.17, 0.48]),
+    };
+    (name, Medium::reduced(Rgb(s), Rgb(a), 1.3).unwrap())
+}
+
+fn main() {
+    let (scene, _folder) = scene();
+    let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
+    let rays = query::build(Backend::preferred(), &meshes).unwrap();
+    let lights = Lights::new(&scene);
+    let table = AreaTable::new(&scene.objects[0].mesh).unwrap();
+    let bench = Bench { scene: &scene, rays: &*rays, lights: &lights, table: &table };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    pool.install(|| {
+        if std::env::var_os("MARMOR_BENCH_TABLE_ONLY").is_none() {
+            timed(&bench);
+        }
+        let largest = std::env::var("MARMOR_BENCH_M").ok().and_then(|m| m.parse().ok()).unwrap_or(100_000);
+        for count in [10_000, 100_000, 1_000_000].into_iter().filter(|c| *c <= largest) {
+            for name in ["skimmilk", "marble", "skin1"] {
+                compare(&bench, medium(name), ModelName::Standard, count);
+            }
+        }
+        for name in [ModelName::Better, ModelName::Normalised, ModelName::Beam, ModelName::Directional] {
+            compare(&bench, medium("skimmilk"), name, 10_000);
+        }
+    });
+}
+
+/// Rates of filling and of the plain loop.
+fn timed(bench: &Bench<'_>) {
+    let mut criterion = Criterion::default()
+        .sample_size(10)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(1))
+        .configure_from_args();
+    let (_, milk) = medium("skimmilk");
+    let model = Model::new(ModelName::Standard, &milk, true);
+    let envelope = Envelope::new(&model, &milk);
+    let mut group = criterion.benchmark_group("cache");
+    group.throughput(Throughput::Elements(10_000));
+    group.bench_function("fill, samples", |b| b.iter(|| black_box(bench.fill(&model, 10_000))));
+    let cache = bench.fill(&model, 10_000);
+    let exit = bench.exits()[0];
+    let mut scratch = Scratch::default();
+    let mut tally = GatherTally::default();
+    group.throughput(Throughput::Elements(cache.lit.len() as u64));
+    for estimator in [Estimator::Notes, Estimator::All] {
+        let gatherer = Gatherer::new(estimator, copy(&cache), &model, 0.0);
+        let mut key = 0;
+        group.bench_function(format!("{}, pairs", estimator.name()), |b| {
+            b.iter(|| {
+                key += 1;
+                black_box(gatherer.gather(&model, &envelope, &exit, hash(key), &mut scratch, &mut tally))
+            });
+        });
+    }
+    group.throughput(Throughput::Elements(cache.lit.len() as u64));
+    group.bench_function("plain loop, S_d", |b| {
+        b.iter(|| {
+            let mut sum = Rgb::BLACK;
+            for sample in &cache.lit {
+                sum += model.radial().unwrap().eval(&sample.entry, &exit) * sample.flux;
+            }
+            black_box(sum)
+        });
+    });
+    group.finish();
+    criterion.final_summary();
+}

@@ -1,0 +1,65 @@
+//! How fast S_d falls with the distance, in a table: what decides where a cut may be coarse. Only the noise of an estimate
+//! depends on it, never its mean.
+
+use crate::bssrdf::{BetterDipole, Model, Radial};
+use crate::math::Vec4;
+use crate::optics::Medium;
+
+/// Table rows per octave of r².
+const STEPS: u32 = 4;
+/// Bits of an f32 below a step.
+const SHIFT: u32 = 23 - STEPS.trailing_zeros();
+/// Exponents of r² [unit²] covered, 2^-60 .. 2^60, as biased exponents of f32.
+const EXPONENTS: std::ops::Range<u32> = 67..187;
+
+/// S_d and its slope at one distance, up to a common factor.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Fall {
+    /// S_d per channel; the fourth is 0.
+    pub value: Vec4,
+    /// -dS_d/dr per channel [value/unit]; the fourth is 0.
+    pub slope: Vec4,
+}
+
+/// [`Fall`] by distance.
+pub struct Envelope {
+    rows: Vec<Fall>,
+    /// Variation of S_d over members of a node that does not come from the distance, relative: from directions or depths.
+    pub other: f32,
+}
+
+impl Envelope {
+    /// Of `model` of `medium`. Models of more than the distance take the better dipole's.
+    pub fn new(model: &Model, medium: &Medium) -> Self {
+        let proxy = BetterDipole::new(medium, true);
+        let radial: &dyn Radial = model.radial().unwrap_or(&proxy);
+        let other = match model {
+            Model::Beam(_) => 0.8,
+            Model::Directional(_) => 0.3,
+            _ => 0.0,
+        };
+        let count = (EXPONENTS.end - EXPONENTS.start) * STEPS;
+        let distance = |i: u32| f32::from_bits(((EXPONENTS.start << (23 - SHIFT)) + i) << SHIFT).sqrt();
+        let finite = |v: f32| if v > 0.0 { v.min(1e30) } else { 0.0 };
+        let rows = (0..count)
+            .map(|i| {
+                let (near, far) = (distance(i), distance(i + 1));
+                let (a, b) = (radial.exitance(near), radial.exitance(far));
+                let mut fall = Fall::default();
+                for c in 0..3 {
+                    fall.value[c] = finite(a[c]);
+                    fall.slope[c] = finite((a[c] - b[c]) / (far - near));
+                }
+                fall
+            })
+            .collect();
+        Self { rows, other }
+    }
+
+    /// At the largest tabulated distance up to √`r2`, `r2` ≥ 0 [unit²].
+    #[inline]
+    pub fn at(&self, r2: f32) -> &Fall {
+        let row = (r2.to_bits() >> SHIFT).saturating_sub(EXPONENTS.start << (23 - SHIFT));
+        &self.rows[(row as usize).min(self.rows.len() - 1)]
+    }
+}

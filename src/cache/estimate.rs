@@ -1,0 +1,97 @@
+//! The estimators by name: what each prepares once a pass, and the sum at an exit.
+
+use super::{Buffer, Cache, Columns, Envelope, GatherTally, Tree, cut, notes};
+use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
+use crate::math::Rgb;
+use crate::scene::Estimator;
+
+/// Below this many samples `cut` is the plain vectorised sum, which is then faster than any tree.
+const SMALL: usize = 1024;
+
+/// A cache made ready for one estimator.
+pub struct Gatherer {
+    attempted: u32,
+    prepared: Prepared,
+    error: f32,
+}
+
+enum Prepared {
+    Notes(Cache),
+    All(Columns),
+    Cut(Tree),
+}
+
+/// Working space of one task, for one model after the other.
+#[derive(Default)]
+pub struct Scratch {
+    buffers: Vec<(std::mem::Discriminant<Model>, Buffer)>,
+}
+
+impl Scratch {
+    fn buffer(&mut self, model: &Model) -> &mut Buffer {
+        let kind = std::mem::discriminant(model);
+        let found = self.buffers.iter().position(|(k, _)| *k == kind);
+        let at = found.unwrap_or_else(|| {
+            self.buffers.push((kind, Buffer::new(model)));
+            self.buffers.len() - 1
+        });
+        &mut self.buffers[at].1
+    }
+}
+
+impl Gatherer {
+    /// Builds what `estimator` needs. `error` is about the relative standard deviation that `cut` adds.
+    pub fn new(estimator: Estimator, cache: Cache, model: &Model, error: f32) -> Self {
+        let attempted = cache.attempted.max(1);
+        let prepared = match estimator {
+            Estimator::Notes => Prepared::Notes(cache),
+            Estimator::Cut if cache.lit.len() > SMALL => Prepared::Cut(Tree::new(&Columns::of(model, &cache.lit))),
+            Estimator::All | Estimator::Cut => Prepared::All(Columns::of(model, &cache.lit)),
+        };
+        Self { attempted, prepared, error }
+    }
+
+    /// (1/M) Σ S_d L_t to `exit`. `key` seeds what is random; the same arguments give the same bits.
+    pub fn gather(
+        &self,
+        model: &Model,
+        envelope: &Envelope,
+        exit: &Exit,
+        key: u64,
+        scratch: &mut Scratch,
+        tally: &mut GatherTally,
+    ) -> Rgb {
+        let sum = match &self.prepared {
+            Prepared::Notes(cache) => return model.visit(Notes { cache, exit, key, tally }),
+            Prepared::All(columns) => {
+                let count = columns.len() as u64;
+                tally.pairs += count;
+                tally.evaluated += count;
+                columns.sum(model, exit)
+            }
+            Prepared::Cut(tree) => {
+                let (sum, work) = cut(tree, model, envelope, exit, self.error, key, scratch.buffer(model));
+                tally.nodes += work.nodes;
+                tally.pairs += work.evaluated;
+                tally.evaluated += work.evaluated;
+                sum
+            }
+        };
+        tally.exits += 1;
+        Rgb::from_fn(|c| (sum[c] / f64::from(self.attempted)) as f32)
+    }
+}
+
+struct Notes<'a> {
+    cache: &'a Cache,
+    exit: &'a Exit,
+    key: u64,
+    tally: &'a mut GatherTally,
+}
+
+impl ModelVisitor for Notes<'_> {
+    type Out = Rgb;
+    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
+        notes(self.cache, model, self.exit, self.key, self.tally)
+    }
+}

@@ -1,0 +1,198 @@
+//! Every estimator has the mean of the plain sum over the same samples, for every model.
+#![allow(clippy::unwrap_used)] // a test that cannot make its model has failed
+
+use marmor::bssrdf::{Bssrdf, Entry, Exit, Model, ModelName, ModelVisitor};
+use marmor::cache::{Cache, CachedSample, Envelope, GatherTally, Gatherer, Scratch};
+use marmor::math::{Rgb, Vec3, hash, unit_f32};
+use marmor::optics::Medium;
+use marmor::scene::Estimator;
+
+const COLOURED: Medium =
+    Medium { sigma_a: Rgb([0.032, 0.17, 0.48]), sigma_s: Rgb([0.74, 0.88, 1.01]), g: 0.0, eta: 1.3 };
+const CLEAR: Medium = Medium { sigma_a: Rgb::BLACK, ..COLOURED };
+/// As wide as a few decay lengths: the lecture's loop must keep some samples to tell its own error.
+const MILD: Medium = Medium { sigma_a: Rgb([0.003, 0.017, 0.04]), sigma_s: Rgb([0.24, 0.38, 0.51]), g: 0.0, eta: 1.3 };
+/// A hundred mean free paths between samples.
+const STIFF: Medium = Medium { sigma_a: Rgb([1.0, 30.0, 0.0]), sigma_s: Rgb([100.0, 70.0, 200.0]), g: 0.0, eta: 1.5 };
+
+fn number(i: u64, dimension: u64) -> f32 {
+    unit_f32((hash(i * 16 + dimension + 1) >> 32) as u32)
+}
+
+/// Samples on a sphere of radius 8 with uneven, coloured flux and oblique directions.
+fn cache(model: &Model, count: u64) -> Cache {
+    let sample = |i| {
+        let z = 2.0 * number(i, 0) - 1.0;
+        let (sin, cos) = (std::f32::consts::TAU * number(i, 1)).sin_cos();
+        let r = (1.0 - z * z).max(0.0).sqrt();
+        let n = Vec3::new(r * cos, r * sin, z);
+        let aside = Vec3::new(number(i, 5) - 0.5, number(i, 6) - 0.5, number(i, 7) - 0.5);
+        CachedSample {
+            entry: Entry { x: 8.0 * n, n, w: (aside - n).normalize() },
+            depth: model.sample_depth(number(i, 8)),
+            flux: Rgb::from_fn(|c| 0.05 + number(i, 2 + c as u64).powi(3)),
+        }
+    };
+    Cache { lit: (0..count).map(sample).collect(), attempted: 2 * count as u32 }
+}
+
+fn copy(cache: &Cache) -> Cache {
+    Cache { lit: cache.lit.clone(), attempted: cache.attempted }
+}
+
+fn exits() -> [Exit; 3] {
+    // On a sample's side, between, and where few samples are near.
+    [Vec3::X, Vec3::new(0.6, -0.48, 0.64), -Vec3::Z].map(|n| Exit { x: 8.0 * n, n, w: n })
+}
+
+/// The sum written out, one evaluation a sample.
+struct Exact<'a>(&'a Cache, &'a Exit);
+
+impl ModelVisitor for Exact<'_> {
+    type Out = [f64; 3];
+    fn visit<B: Bssrdf>(self, model: &B) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for s in &self.0.lit {
+            let value = model.eval_cached(&s.entry, s.depth, self.1, 0.0);
+            for c in 0..3 {
+                sum[c] += f64::from(value[c]) * f64::from(s.flux[c]) / f64::from(self.0.attempted);
+            }
+        }
+        sum
+    }
+}
+
+/// Worst deviation of the mean of `runs` estimates from the exact sum, in standard errors; `off` is a planted factor.
+/// Errors of f32 sums are counted as part of the standard error.
+fn deviation(estimator: Estimator, model: &Model, medium: &Medium, count: u64, runs: u64, off: f64) -> f64 {
+    let cache = cache(model, count);
+    let envelope = Envelope::new(model, medium);
+    let gatherer = Gatherer::new(estimator, copy(&cache), model, 0.1);
+    let (mut scratch, mut tally, mut worst) = (Scratch::default(), GatherTally::default(), 0.0_f64);
+    for (at, exit) in exits().iter().enumerate() {
+        let exact = model.visit(Exact(&cache, exit));
+        let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
+        for run in 0..runs {
+            let key = hash(hash(run + 1) + at as u64);
+            let value = gatherer.gather(model, &envelope, exit, key, &mut scratch, &mut tally);
+            for c in 0..3 {
+                // About the exact value, so that squares keep their digits.
+                let apart = f64::from(value[c]) * off - exact[c];
+                sum[c] += apart;
+                squares[c] += apart * apart;
+            }
+        }
+        let n = runs as f64;
+        for c in 0..3 {
+            let mean = sum[c] / n;
+            let error = ((squares[c] / n - mean * mean).max(0.0) / (n - 1.0)).sqrt();
+            let rounding = 5e-6 * exact[c].abs() + 1e-30;
+            worst = worst.max(mean.abs() / error.hypot(rounding));
+        }
+    }
+    worst
+}
+
+fn models(medium: &Medium) -> Vec<Model> {
+    let mut models = vec![Model::with_thickness(ModelName::Slab, medium, Some(50.0), true).unwrap()];
+    for name in ModelName::ALL {
+        if !matches!(name, ModelName::Slab | ModelName::Auto) {
+            models.push(Model::new(name, medium, true));
+        }
+    }
+    models
+}
+
+#[test]
+fn every_estimator_has_the_mean_of_the_sum() {
+    for medium in [MILD, CLEAR, COLOURED, STIFF] {
+        for model in models(&medium) {
+            for &estimator in Estimator::ALL {
+                if estimator == Estimator::Notes && (medium == COLOURED || medium == STIFF) {
+                    continue;
+                }
+                let (count, runs) = match estimator {
+                    Estimator::Notes => (200, 300),
+                    Estimator::All => (1500, 2),
+                    Estimator::Cut => (1500, 300),
+                };
+                let found = deviation(estimator, &model, &medium, count, runs, 1.0);
+                assert!(found < 6.0, "{} {}: {found}", estimator.name(), model.name().name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_mean_that_is_two_percent_off_is_refused() {
+    for model in models(&COLOURED) {
+        for off in [0.98, 1.02] {
+            let found = deviation(Estimator::Cut, &model, &COLOURED, 1500, 600, off);
+            assert!(found > 6.0, "{}: {found}", model.name().name());
+        }
+    }
+}
+
+#[test]
+fn caches_of_a_few_samples_and_of_none_are_summed() {
+    let model = Model::new(ModelName::Standard, &COLOURED, true);
+    let envelope = Envelope::new(&model, &COLOURED);
+    let mut scratch = Scratch::default();
+    for count in [0, 1, 7, 8, 9, 1025] {
+        let cache = cache(&model, count);
+        for &estimator in &[Estimator::All, Estimator::Cut] {
+            let exact = model.visit(Exact(&cache, &exits()[0]));
+            let gatherer = Gatherer::new(estimator, copy(&cache), &model, 1e-4);
+            let mut tally = GatherTally::default();
+            let value = gatherer.gather(&model, &envelope, &exits()[0], 5, &mut scratch, &mut tally);
+            for c in 0..3 {
+                assert!((f64::from(value[c]) - exact[c]).abs() <= 1e-3 * exact[c], "{count} {}", estimator.name());
+            }
+            assert_eq!(tally.exits, 1);
+        }
+    }
+}
+
+#[test]
+fn a_cut_visits_few_of_many_samples_and_its_noise_follows_the_error_asked_for() {
+    let model = Model::new(ModelName::Standard, &COLOURED, true);
+    let envelope = Envelope::new(&model, &COLOURED);
+    let cache = cache(&model, 20_000);
+    let exact = model.visit(Exact(&cache, &exits()[1]));
+    let mut scratch = Scratch::default();
+    let noise = [0.01, 0.1].map(|error| {
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, error);
+        let mut tally = GatherTally::default();
+        let mut squares = 0.0;
+        for run in 0..100 {
+            let value = gatherer.gather(&model, &envelope, &exits()[1], hash(run), &mut scratch, &mut tally);
+            squares += (f64::from(value[0]) / exact[0] - 1.0).powi(2) / 100.0;
+        }
+        assert!(tally.evaluated < 100 * 4000, "{tally:?}");
+        squares.sqrt()
+    });
+    assert!(noise[0] < 0.04 && noise[0] < 0.6 * noise[1] && noise[1] < 0.1, "{noise:?}");
+}
+
+/// The tree is built by several tasks, and nothing of it may depend on who does what.
+#[test]
+fn the_same_bits_come_out_for_any_number_of_threads() {
+    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
+        let model = Model::new(name, &COLOURED, true);
+        let envelope = Envelope::new(&model, &COLOURED);
+        let cache = cache(&model, 20_000);
+        let run = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, 0.1);
+                let mut scratch = Scratch::default();
+                let mut tally = GatherTally::default();
+                exits().map(|e| gatherer.gather(&model, &envelope, &e, 9, &mut scratch, &mut tally).0.map(f32::to_bits))
+            })
+        };
+        let one = run(1);
+        for threads in [2, 5] {
+            assert_eq!(run(threads), one, "{}: {threads} threads", name.name());
+        }
+    }
+}
