@@ -317,3 +317,19 @@ fn an_interrupt_writes_what_there_is() {
     let interrupted = Image::read_exr(&folder.path().join("x.exr")).unwrap();
     assert!(interrupted.pixels == undisturbed.pixels, "{passes} passes, interrupted, are not {passes} passes");
 }
+
+#[test]
+fn what_auto_chose_is_said_with_the_reason() {
+    let folder = folder();
+    let auto = ["-D", "material.wax.model=auto"];
+    let told = text(&marmor(folder.path(), &[&["check", "scene.toml"], &auto[..]].concat()).stdout);
+    assert!(told.contains("model auto -> beam (least reduced albedo 0.952, g 0.000: "), "{told}");
+    let thick = ["-D", "material.wax.thickness=2"];
+    let told = text(&marmor(folder.path(), &[&["check", "scene.toml"], &auto[..], &thick].concat()).stdout);
+    assert!(told.contains("model auto -> slab (4.1 transport mean free paths thick"), "{told}");
+    let render = ["render", "scene.toml", "-o", "out.exr", "--spp", "1", "-q", "-D", "render.spp=1"];
+    let output = marmor(folder.path(), &[&render[..], &auto, &thick].concat());
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let bytes = text(&fs::read(folder.path().join("out.exr")).unwrap());
+    assert!(bytes.contains("wax: auto -> slab (4.1 transport mean free paths thick"), "the header names the choice");
+}

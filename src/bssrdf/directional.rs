@@ -215,10 +215,10 @@ impl DirectionalChannel {
         }
         let rule = GaussLegendre::new(16);
         let unit = 1.0 / self.sigma_t_prime;
-        // r = e^y in units of the mean free path; beyond r = 1e6 or 50/s nothing is left. The end of the
+        // r = e^y in units of the mean free path; beyond r = 1e8 or 50/s nothing is left. The end of the
         // logarithmic axis at 1e-5 drops r²: 1e-10.
-        let (first, last) = (1e-5_f64.ln(), 1e6_f64.min(50.0 / self.s.max(1e-6)).ln());
-        let panels = 24;
+        let (first, last) = (1e-5_f64.ln(), 1e8_f64.min(50.0 / self.s.max(1e-7)).ln());
+        let panels = 30;
         let width = (last - first) / f64::from(panels);
         let sum: f64 = (0..panels)
             .map(|i| {
