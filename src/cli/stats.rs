@@ -37,6 +37,7 @@ pub fn write(
         "rays": tally.rays,
         "gather": tally.gather,
         "per_exit": {
+            "nodes": tally.gather.nodes as f64 / exits,
             "pairs": tally.gather.pairs as f64 / exits,
             "evaluated": tally.gather.evaluated as f64 / exits,
         },
