@@ -296,8 +296,10 @@ fn the_same_bytes_come_out_for_any_number_of_threads() {
     }
     check(&occlusion(), &scene);
     check(&Direct::new(&scene, 2).unwrap(), &scene);
-    let options = SubsurfaceOptions { cache_samples: 700, specular: true, ..subsurface(7) };
-    check(&Subsurface::new(&scene, options).unwrap(), &scene);
+    for (estimator, cache_samples) in [(Estimator::Notes, 700), (Estimator::All, 700), (Estimator::Cut, 4000)] {
+        let options = SubsurfaceOptions { estimator, cache_samples, specular: true, ..subsurface(7) };
+        check(&Subsurface::new(&scene, options).unwrap(), &scene);
+    }
 }
 
 #[test]

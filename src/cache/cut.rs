@@ -5,7 +5,7 @@ use crate::bssrdf::{Exit, Model};
 use crate::math::{Vec4, hash};
 
 /// A node whose members spread over less than this share of its distance counts as a point when the sum is guessed.
-const GUESS: f32 = 0.5;
+const GUESS: f32 = 0.3;
 
 /// Working space of [`cut`], for one model.
 pub struct Buffer {

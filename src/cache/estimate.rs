@@ -6,7 +6,7 @@ use crate::math::Rgb;
 use crate::scene::Estimator;
 
 /// Below this many samples `cut` is the plain vectorised sum, which is then faster than any tree.
-const SMALL: usize = 1024;
+pub const PLAIN_SUM: usize = 1024;
 
 /// A cache made ready for one estimator.
 pub struct Gatherer {
@@ -40,12 +40,12 @@ impl Scratch {
 }
 
 impl Gatherer {
-    /// Builds what `estimator` needs. `error` is about the relative standard deviation that `cut` adds.
+    /// Builds what `estimator` needs. `error` is the largest share of the sum that one node of a `cut` may be wrong by.
     pub fn new(estimator: Estimator, cache: Cache, model: &Model, error: f32) -> Self {
         let attempted = cache.attempted.max(1);
         let prepared = match estimator {
             Estimator::Notes => Prepared::Notes(cache),
-            Estimator::Cut if cache.lit.len() > SMALL => Prepared::Cut(Tree::new(&Columns::of(model, &cache.lit))),
+            Estimator::Cut if cache.lit.len() > PLAIN_SUM => Prepared::Cut(Tree::new(&Columns::of(model, &cache.lit))),
             Estimator::All | Estimator::Cut => Prepared::All(Columns::of(model, &cache.lit)),
         };
         Self { attempted, prepared, error }

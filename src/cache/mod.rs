@@ -14,7 +14,7 @@ use crate::math::Rgb;
 pub use columns::Columns;
 pub use cut::{Buffer, CutWork, cut};
 pub use envelope::{Envelope, Fall};
-pub use estimate::{Gatherer, Scratch};
+pub use estimate::{Gatherer, PLAIN_SUM, Scratch};
 pub use fill::Filler;
 pub use notes::notes;
 pub use tree::{Node, Tree};

@@ -43,6 +43,7 @@ pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
         "rays": tally.rays,
         "gather": tally.gather,
         "per_exit": {
+            "nodes": tally.gather.nodes as f64 / exits,
             "pairs": tally.gather.pairs as f64 / exits,
             "evaluated": tally.gather.evaluated as f64 / exits,
         },

@@ -4,7 +4,7 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model};
-use crate::cache::{Envelope, Filler, Gatherer, Scratch};
+use crate::cache::{Envelope, Filler, Gatherer, PLAIN_SUM, Scratch};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -21,7 +21,7 @@ pub struct SubsurfaceOptions {
     pub cache_samples: u32,
     /// How the sum over the cache is estimated.
     pub estimator: Estimator,
-    /// About the relative standard deviation that `cut` adds at each sample of a pixel.
+    /// The largest share of the sum that one node of a `cut` may be wrong by.
     pub cut_error: f32,
     /// How directions of entering light are picked.
     pub entry: EntrySampling,
@@ -106,6 +106,17 @@ impl Subsurface {
         inside * transmittance(eta, mu) + mirrored
     }
 
+    fn tree_part(&self, name: &str) -> Part {
+        let part = format!("sample tree of `{name}`");
+        match self.options.estimator {
+            Estimator::Cut if self.options.cache_samples as usize > PLAIN_SUM => {
+                Part::built(part, format!("each pass, where more than {PLAIN_SUM} samples carry light"))
+            }
+            Estimator::Cut => Part::left_out(part, format!("up to {PLAIN_SUM} samples the plain sum is faster")),
+            other => Part::left_out(part, format!("the estimator `{}` sums over the samples", other.name())),
+        }
+    }
+
     /// Radiance from the mirror direction: lights, environment, and other surfaces as Lambertian ones.
     fn mirrored(&self, view: View<'_>, at: &SurfacePoint, w: Vec3, stream: &mut PixelStream, tally: &mut Tally) -> Rgb {
         let n = if at.n.dot(w) > 0.0 { at.n } else { at.n_geometric };
@@ -188,6 +199,7 @@ impl Integrator for Subsurface {
                     body.table.len()
                 ),
             ));
+            parts.push(self.tree_part(name));
             parts.push(if body.medium.is_grey() {
                 Part::left_out(format!("colour of `{name}`"), "a grey medium: S_d is evaluated in one channel")
             } else {

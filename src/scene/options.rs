@@ -68,13 +68,13 @@ impl Estimator {
         match self {
             Self::Notes => 1024,
             Self::All => 4096,
-            Self::Cut => 16384,
+            Self::Cut => 32768,
         }
     }
 }
 
 /// [`MethodOptions::cut_error`] unless the scene says.
-pub const DEFAULT_CUT_ERROR: f32 = 0.03;
+pub const DEFAULT_CUT_ERROR: f32 = 0.3;
 
 named! {
     /// How the light arriving at a cached sample is found.
@@ -100,7 +100,7 @@ pub struct MethodOptions {
     pub cache_samples: Option<u32>,
     /// Subsurface: how the cache is summed.
     pub estimator: Option<Estimator>,
-    /// Subsurface: about the relative standard deviation that `cut` adds at each sample of a pixel, 1e-4 to 1.
+    /// Subsurface: the largest share of the sum that one node of a `cut` may be wrong by, 1e-4 to 1.
     pub cut_error: Option<f64>,
     /// Subsurface: the model of every translucent material, over the materials' own.
     pub model: Option<ModelName>,
