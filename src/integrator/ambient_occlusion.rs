@@ -2,7 +2,7 @@
 
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::math::Rgb;
-use crate::query::{Hit, Ray};
+use crate::query::Ray;
 use crate::sampling::cosine_hemisphere;
 use crate::scene::Scene;
 
@@ -20,17 +20,13 @@ impl Integrator for AmbientOcclusion {
     fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
 
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        let camera: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
-        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
-        view.rays.closest_batch(&camera, &mut hits);
-        tally.rays.camera += rays.len() as u64;
+        let hits = view.camera_hits(rays, tally);
 
         let per_hit = self.rays as usize;
         let mut probes = Vec::with_capacity(rays.len() * per_hit);
         for (ray, hit) in rays.iter().zip(&hits) {
             let Some(hit) = hit else { continue };
-            let mesh = &view.scene.objects[hit.mesh as usize].mesh;
-            let at = mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.ray.direction);
+            let at = view.point(hit, ray.ray.direction);
             for part in 0..self.rays {
                 let w = cosine_hemisphere(at.n, ray.stream.split(part, self.rays).next_2d());
                 probes.push(Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) });

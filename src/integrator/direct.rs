@@ -6,7 +6,6 @@ use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::error::Result;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
-use crate::query::{Hit, Ray};
 use crate::scene::{Scene, Surface};
 
 /// Lambertian surfaces under the scene's lights, without interreflection. A translucent surface is shown as
@@ -53,16 +52,12 @@ impl Integrator for Direct {
     fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
 
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        let camera: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
-        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
-        view.rays.closest_batch(&camera, &mut hits);
-        tally.rays.camera += rays.len() as u64;
+        let hits = view.camera_hits(rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(),
                 Some(hit) => {
-                    let mesh = &view.scene.objects[hit.mesh as usize].mesh;
-                    let at = mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.ray.direction);
+                    let at = view.point(hit, ray.ray.direction);
                     let mut stream = ray.stream;
                     emitted(view.scene, hit, ray.ray.direction)
                         + self.light.reflected(view, &at, self.albedo[hit.mesh as usize], &mut stream, tally)

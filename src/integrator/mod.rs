@@ -7,8 +7,9 @@ mod shade;
 mod subsurface;
 
 use crate::cache::GatherTally;
-use crate::math::Rgb;
-use crate::query::{Ray, RayQuery, RayTally};
+use crate::geometry::SurfacePoint;
+use crate::math::{Rgb, Vec3};
+use crate::query::{Hit, Ray, RayQuery, RayTally};
 use crate::sampling::PixelStream;
 use crate::scene::Scene;
 pub use ambient_occlusion::AmbientOcclusion;
@@ -22,6 +23,23 @@ pub struct View<'a> {
     pub scene: &'a Scene,
     /// Rays against its meshes.
     pub rays: &'a dyn RayQuery,
+}
+
+impl View<'_> {
+    /// The nearest hit of each camera ray.
+    fn camera_hits(&self, rays: &[CameraRay], tally: &mut Tally) -> Vec<Option<Hit>> {
+        let rays: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
+        let mut hits = vec![None; rays.len()];
+        self.rays.closest_batch(&rays, &mut hits);
+        tally.rays.camera += rays.len() as u64;
+        hits
+    }
+
+    /// The point of `hit`, its normals towards where a ray into `direction` came from.
+    #[inline]
+    fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
+        self.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v).facing(-direction)
+    }
 }
 
 /// One sample of one pixel.

@@ -85,7 +85,7 @@ impl Subsurface {
         scratch: &mut Scratch,
         tally: &mut Tally,
     ) -> Rgb {
-        let at = surface_point(view, hit, ray.ray.direction);
+        let at = view.point(hit, ray.ray.direction);
         let mut stream = ray.stream;
         let object = hit.mesh as usize;
         let (Some(body), Some(gatherer)) = (&self.bodies[object], &pass[object]) else {
@@ -128,17 +128,12 @@ impl Subsurface {
         match view.rays.closest(&Ray::new(at.leave(direction), direction)) {
             None => self.light.lights.environment(),
             Some(hit) => {
-                let there = surface_point(view, &hit, direction);
+                let there = view.point(&hit, direction);
                 emitted(view.scene, &hit, direction)
                     + self.light.reflected(view, &there, self.albedo[hit.mesh as usize], stream, tally)
             }
         }
     }
-}
-
-/// The point of `hit`, its normals towards where the ray came from.
-fn surface_point(view: View<'_>, hit: &Hit, direction: Vec3) -> SurfacePoint {
-    view.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v).facing(-direction)
 }
 
 impl Integrator for Subsurface {
@@ -168,10 +163,7 @@ impl Integrator for Subsurface {
     }
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        let camera: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
-        let mut hits: Vec<Option<Hit>> = vec![None; rays.len()];
-        view.rays.closest_batch(&camera, &mut hits);
-        tally.rays.camera += rays.len() as u64;
+        let hits = view.camera_hits(rays, tally);
         let mut scratch = Scratch::default();
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
@@ -183,6 +175,12 @@ impl Integrator for Subsurface {
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {
         let mut parts = self.light.parts(scene);
+        parts.push(match self.options.entry {
+            EntrySampling::Light => Part::built("any-hit rays for entering light", "no hit point is needed"),
+            EntrySampling::Cosine => {
+                Part::built("nearest-hit rays for entering light", "a cosine-sampled direction must find what shines")
+            }
+        });
         if self.bodies.iter().all(Option::is_none) {
             parts.push(Part::left_out("area tables and sample cache", "no translucent material"));
         }
