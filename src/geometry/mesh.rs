@@ -39,6 +39,9 @@ pub struct SurfacePoint {
 /// coordinate away from it: interpolation and the intersection test each lose a few.
 const ERROR_ULPS: f32 = 32.0 * f32::EPSILON;
 
+/// Sine of the least elevation of a mirrored direction above a surface whose normal was bent for it.
+const LEAST_ELEVATION: f32 = 0.01;
+
 impl Mesh {
     /// The three corners of a triangle [unit].
     #[inline]
@@ -106,11 +109,61 @@ impl SurfacePoint {
         self
     }
 
+    /// The shading normal, bent towards the geometric one as far as it takes for light mirrored into the unit direction
+    /// `w` to come from above the surface; `w` is above it, and the point [`Self::facing`] it. Coarse triangles carry
+    /// normals that look past the viewer: unbent, Fresnel's transmittance would draw dark lines along creases.
+    #[inline]
+    pub fn normal_seen_from(&self, w: Vec3) -> Vec3 {
+        let least = LEAST_ELEVATION.min(0.9 * self.n_geometric.dot(w));
+        let mirrored = self.n * (2.0 * self.n.dot(w).max(0.0)) - w;
+        let elevation = self.n_geometric.dot(mirrored);
+        if elevation >= least {
+            return self.n;
+        }
+        // Lift the mirrored direction to the least elevation; the normal is half-way to it.
+        let lifted = (mirrored + self.n_geometric * (least - elevation)).normalize_or(self.n_geometric);
+        (w + lifted).normalize_or(self.n_geometric)
+    }
+
     /// Where a ray into `direction` starts so that it cannot meet the surface it leaves: moved along the
     /// geometric normal, to the side of `direction`, by the bound of the error. Scales with the scene.
     #[inline]
     pub fn leave(&self, direction: Vec3) -> Vec3 {
         let offset = self.n_geometric * self.error;
         if self.n_geometric.dot(direction) < 0.0 { self.x - offset } else { self.x + offset }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn point(n: Vec3) -> SurfacePoint {
+        SurfacePoint { x: Vec3::ZERO, n_geometric: Vec3::Z, n: n.normalize(), error: 0.0 }
+    }
+
+    #[test]
+    fn a_normal_that_mirrors_upwards_stays_and_one_that_does_not_is_bent() {
+        let w = Vec3::new(0.6, 0.0, 0.8);
+        let harmless = point(Vec3::new(0.1, 0.2, 1.0));
+        assert_eq!(harmless.normal_seen_from(w), harmless.n);
+        for n in
+            [Vec3::new(-1.0, 0.0, 0.1), Vec3::new(-0.8, 0.1, 0.6), Vec3::new(1.0, 0.0, 0.01), Vec3::new(0.0, 1.0, 1e-3)]
+        {
+            let bent = point(n).normal_seen_from(w);
+            let mirrored = bent * (2.0 * bent.dot(w)) - w;
+            assert!((bent.length() - 1.0).abs() < 1e-6 && bent.dot(w) > 0.0, "{n}: {bent}");
+            assert!(mirrored.z > 0.009, "{n}: {bent} mirrors to {mirrored}");
+        }
+    }
+
+    #[test]
+    fn the_bend_is_continuous_where_it_begins() {
+        let w = Vec3::new(0.6, 0.0, 0.8);
+        let bent = |angle: f32| point(Vec3::new(angle.sin(), 0.0, angle.cos())).normal_seen_from(w);
+        for i in 0..3000 {
+            let angle = -1.5 + i as f32 * 1e-3;
+            assert!(bent(angle).distance(bent(angle + 1e-3)) < 5e-3, "jump at {angle}");
+        }
     }
 }

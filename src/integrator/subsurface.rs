@@ -94,12 +94,12 @@ impl Subsurface {
         };
         let w = -ray.ray.direction;
         let eta = body.medium.eta;
-        // An interpolated normal may look away from the viewer; the triangle's own never does.
-        let mu = if at.n.dot(w) > 0.0 { at.n.dot(w) } else { at.n_geometric.dot(w) };
-        let exit = Exit { x: at.x, n: at.n, w };
+        let n = at.normal_seen_from(w);
+        let mu = n.dot(w);
+        let exit = Exit { x: at.x, n, w };
         let inside = gatherer.gather(&body.model, &body.envelope, &exit, stream.key(), scratch, &mut tally.gather);
         let mirrored = if self.options.specular {
-            self.mirrored(view, &at, w, &mut stream, tally) * reflectance(eta, mu)
+            self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(eta, mu)
         } else {
             Rgb::BLACK
         };
@@ -117,13 +117,15 @@ impl Subsurface {
         }
     }
 
-    /// Radiance from the mirror direction: lights, environment, and other surfaces as Lambertian ones.
-    fn mirrored(&self, view: View<'_>, at: &SurfacePoint, w: Vec3, stream: &mut PixelStream, tally: &mut Tally) -> Rgb {
-        let n = if at.n.dot(w) > 0.0 { at.n } else { at.n_geometric };
-        let direction = reflect(w, n);
-        if at.n_geometric.dot(direction) <= 0.0 {
-            return Rgb::BLACK;
-        }
+    /// Radiance from the mirrored `direction`: lights, environment, and other surfaces as Lambertian ones.
+    fn mirrored(
+        &self,
+        view: View<'_>,
+        at: &SurfacePoint,
+        direction: Vec3,
+        stream: &mut PixelStream,
+        tally: &mut Tally,
+    ) -> Rgb {
         tally.rays.bounce += 1;
         match view.rays.closest(&Ray::new(at.leave(direction), direction)) {
             None => self.light.lights.environment(),
