@@ -3,7 +3,7 @@
 //!     cargo bench --features embree --bench cache
 //!     MARMOR_BENCH_OBJ=mesh.obj cargo bench --features embree --bench cache
 //!
-//! Without a file the mesh is a closed sphere with bumps, 60 mm wide. The lines at the end tell, for each medium, model
+//! A file's mesh is scaled to 100 mm; without a file the mesh is a closed sphere with bumps, 60 mm wide. The lines at the end tell, for each medium, model
 //! and number of samples M: time at an exit and noise against the sum over all samples, and the ratio to the lecture's
 //! loop, all estimators by turns in one run.
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // a benchmark prints, and stops at what it cannot read
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use criterion::{Criterion, Throughput};
 use marmor::bssrdf::{Exit, Model, ModelName};
 use marmor::cache::{Cache, Envelope, Filler, GatherTally, Gatherer, Scratch};
-use marmor::geometry::AreaTable;
+use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
 use marmor::math::{Rgb, hash};
 use marmor::optics::Medium;
@@ -27,13 +27,17 @@ const EXITS: u64 = 64;
 /// Estimates at each of them.
 const DRAWS: u64 = 16;
 
-/// The rendering scene of a mesh of 60 mm under a lamp behind it.
+/// The mesh, in skim milk, under a lamp behind it.
 fn scene() -> (Scene, tempfile::TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let object = match std::env::var("MARMOR_BENCH_OBJ") {
         Ok(path) => {
-            std::fs::copy(path, folder.path().join("mesh.obj")).unwrap();
-            "mesh = \"mesh.obj\"\n".to_string()
+            std::fs::copy(&path, folder.path().join("mesh.obj")).unwrap();
+            let mesh = load_obj(path.as_ref()).unwrap();
+            let (lo, hi) = mesh.bounds().unwrap();
+            let scale = 100.0 / (hi - lo).max_element();
+            let [x, y, z] = (-0.5 * scale * (lo + hi)).to_array();
+            format!("mesh = \"mesh.obj\"\ntransform = {{ scale = {scale}, translate = [{x}, {y}, {z}] }}\n")
         }
         Err(_) => {
             std::fs::write(folder.path().join("mesh.obj"), bumps(133)).unwrap();
