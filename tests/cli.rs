@@ -191,6 +191,18 @@ fn check_says_what_is_built_and_what_is_left_out() {
 }
 
 #[test]
+fn a_model_without_the_first_order_is_told() {
+    let folder = folder();
+    let told = |model: &str| text(&marmor(folder.path(), &["check", "scene.toml", "--model", model]).stdout);
+    for model in ["better", "beam"] {
+        assert!(told(model).contains("leaves out light scattered once"), "{model}");
+    }
+    for model in ["standard", "directional"] {
+        assert!(!told(model).contains("scattered once"), "{model}");
+    }
+}
+
+#[test]
 fn light_that_faces_away_is_told() {
     let folder = folder();
     let output = marmor(folder.path(), &["render", "scene.toml", "-o", "x.png", "-D", "object.1.flip=true"]);

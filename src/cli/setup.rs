@@ -104,7 +104,6 @@ pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
     if args.as_notes {
         for material in &mut scene.materials {
             if let Surface::Translucent(t) = &mut material.surface {
-                t.model = ModelName::Standard;
                 t.exit_normalisation = false;
             }
         }
@@ -123,7 +122,8 @@ impl MethodArgs {
         let mut keys = Vec::new();
         let mut put = |key: &str, value: Option<String>| keys.extend(value.map(|v| format!("{key}={v}")));
         put("method.name", self.method.map(|m| m.name().into()));
-        put("method.model", self.model.map(|m| m.name().into()));
+        let model = if self.as_notes { Some(ModelName::Standard) } else { self.model };
+        put("method.model", model.map(|m| m.name().into()));
         put("method.estimator", self.estimator.map(|e| e.name().into()));
         put("render.seed", self.seed.map(|s| s.to_string()));
         keys.extend(self.define.iter().cloned());
