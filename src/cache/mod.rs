@@ -12,7 +12,7 @@ mod tree;
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
 pub use columns::Columns;
-pub use cut::{Buffer, CutWork, cut};
+pub use cut::{Buffer, Cut, CutWork};
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Gatherer, PLAIN_SUM, Scratch};
 pub use fill::Filler;

@@ -76,34 +76,51 @@ impl Subsurface {
         })
     }
 
-    fn shade(
+    /// What leaves through the surface at each translucent hit; exits of one object are gathered together.
+    fn inside(
         &self,
         view: View<'_>,
         pass: &[Option<Gatherer>],
-        ray: &CameraRay,
-        hit: &Hit,
-        scratch: &mut Scratch,
+        rays: &[CameraRay],
+        hits: &[Option<Hit>],
         tally: &mut Tally,
-    ) -> Rgb {
+    ) -> Vec<Rgb> {
+        let mut inside = vec![Rgb::BLACK; rays.len()];
+        let object = |i: usize| hits[i].as_ref().map(|hit| hit.mesh as usize).filter(|&o| self.bodies[o].is_some());
+        let mut translucent: Vec<(usize, usize)> = (0..rays.len()).filter_map(|i| Some((object(i)?, i))).collect();
+        translucent.sort_unstable();
+        let (mut scratch, mut found) = (Scratch::default(), Vec::new());
+        for group in translucent.chunk_by(|a, b| a.0 == b.0) {
+            let (Some(body), Some(gatherer)) = (&self.bodies[group[0].0], &pass[group[0].0]) else { continue };
+            let exit = |&(_, i): &(usize, usize)| {
+                let (w, hit) = (-rays[i].ray.direction, hits[i].as_ref()?);
+                let at = view.point(hit, rays[i].ray.direction);
+                Some(Exit { x: at.x, n: at.normal_seen_from(w), w })
+            };
+            let exits: Vec<Exit> = group.iter().filter_map(exit).collect();
+            let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
+            gatherer.gather((&body.model, &body.envelope), &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
+            for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
+                inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));
+            }
+        }
+        inside
+    }
+
+    fn shade(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, inside: Rgb, tally: &mut Tally) -> Rgb {
         let at = view.point(hit, ray.ray.direction);
         let mut stream = ray.stream;
         let object = hit.mesh as usize;
-        let (Some(body), Some(gatherer)) = (&self.bodies[object], &pass[object]) else {
+        let Some(body) = &self.bodies[object] else {
             return emitted(view.scene, hit, ray.ray.direction)
                 + self.light.reflected(view, &at, self.albedo[object], &mut stream, tally);
         };
+        if !self.options.specular {
+            return inside;
+        }
         let w = -ray.ray.direction;
-        let eta = body.medium.eta;
         let n = at.normal_seen_from(w);
-        let mu = n.dot(w);
-        let exit = Exit { x: at.x, n, w };
-        let inside = gatherer.gather(&body.model, &body.envelope, &exit, stream.key(), scratch, &mut tally.gather);
-        let mirrored = if self.options.specular {
-            self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(eta, mu)
-        } else {
-            Rgb::BLACK
-        };
-        inside * transmittance(eta, mu) + mirrored
+        inside + self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(body.medium.eta, n.dot(w))
     }
 
     fn tree_part(&self, name: &str) -> Part {
@@ -166,13 +183,17 @@ impl Integrator for Subsurface {
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = view.camera_hits(rays, tally);
-        let mut scratch = Scratch::default();
-        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+        let inside = self.inside(view, pass, rays, &hits, tally);
+        for (((ray, hit), inside), out) in rays.iter().zip(&hits).zip(inside).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(),
-                Some(hit) => self.shade(view, pass, ray, hit, &mut scratch, tally),
+                Some(hit) => self.shade(view, ray, hit, inside, tally),
             };
         }
+    }
+
+    fn shares_tiles(&self) -> bool {
+        self.options.estimator == Estimator::Cut
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {
