@@ -4,7 +4,7 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model};
-use crate::cache::{Envelope, Filler, Gatherer, PLAIN_SUM, Scratch};
+use crate::cache::{Density, Envelope, Filler, Gatherer, PLAIN_SUM, Scratch, Seen, seen};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -12,7 +12,8 @@ use crate::math::{Rgb, Vec3};
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{CacheStream, PixelStream, Points};
-use crate::scene::{EntrySampling, Estimator, Scene, Surface};
+use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface};
+use std::sync::OnceLock;
 
 /// Options of [`Subsurface`].
 #[derive(Clone, Copy, Debug)]
@@ -25,8 +26,10 @@ pub struct SubsurfaceOptions {
     pub cut_error: f32,
     /// How directions of entering light are picked.
     pub entry: EntrySampling,
-    /// How points on the surface are spread.
+    /// What numbers pick the points on the surface.
     pub points: Points,
+    /// How the points are spread over the surface.
+    pub spread: Spread,
     /// Whether smooth surfaces mirror lights and environment.
     pub specular: bool,
     /// Samples of each kind of light per diffuse point.
@@ -43,6 +46,8 @@ pub struct Subsurface {
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
     bodies: Vec<Option<Body>>,
+    /// Where each body's samples are spent; known with the first pass.
+    densities: OnceLock<Vec<Density>>,
 }
 
 /// A translucent object.
@@ -73,7 +78,40 @@ impl Subsurface {
             light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
             bodies: scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?,
+            densities: OnceLock::new(),
         })
+    }
+
+    /// What fills the cache of object number `object`.
+    fn filler<'a>(&'a self, view: View<'a>, object: usize, body: &'a Body, density: &'a Density) -> Filler<'a> {
+        Filler {
+            scene: view.scene,
+            rays: view.rays,
+            lights: &self.light.lights,
+            object: object as u32,
+            table: &body.table,
+            model: &body.model,
+            eta: body.medium.eta,
+            sampling: self.options.entry,
+            stream: &body.stream,
+            density,
+        }
+    }
+
+    /// Where each body's samples are spent. A function of scene and seed: the same for any pass that asks first.
+    fn densities(&self, view: View<'_>) -> Vec<Density> {
+        // With directions by the cosine most trials would miss the lights.
+        if self.options.spread == Spread::Area || self.options.entry == EntrySampling::Cosine {
+            return self.bodies.iter().map(|_| Density::even()).collect();
+        }
+        let even = Density::even();
+        let density = |(object, (body, seen)): (usize, (&Option<Body>, Vec<Seen>))| {
+            let Some(body) = body else { return Density::even() };
+            let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
+            let filler = Filler { stream: &stream, ..self.filler(view, object, body, &even) };
+            Density::seen(&filler, &body.envelope, &seen)
+        };
+        self.bodies.iter().zip(seen(view.scene, view.rays)).enumerate().map(density).collect()
     }
 
     /// What leaves through the surface at each translucent hit; exits of one object are gathered together.
@@ -159,19 +197,10 @@ impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        let densities = self.densities.get_or_init(|| self.densities(view));
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
-            let filler = Filler {
-                scene: view.scene,
-                rays: view.rays,
-                lights: &self.light.lights,
-                object: object as u32,
-                table: &body.table,
-                model: &body.model,
-                eta: body.medium.eta,
-                sampling: self.options.entry,
-                stream: &body.stream,
-            };
+            let filler = self.filler(view, object, body, &densities[object]);
             let count = self.options.cache_samples;
             let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
             tally.gather.samples += u64::from(count);
