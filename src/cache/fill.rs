@@ -88,6 +88,13 @@ impl Filler<'_> {
     /// Sample number `number`, if nothing stands on the ray beside it.
     fn candidate(&self, number: u64) -> Option<(CachedSample, Ray)> {
         let (at, weight, u) = self.point(number);
+        self.entering(at, weight, u)
+    }
+
+    /// Light that enters at `at`, a point with one over its density `weight` [unit²], if nothing stands on the ray beside it.
+    pub fn entering(&self, at: SurfacePoint, weight: f32, u: [f32; 5]) -> Option<(CachedSample, Ray)> {
+        // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
+        let at = SurfacePoint { n: at.n_geometric, ..at };
         let arrival = self.arrival(&at, [u[0], u[1], u[2], u[3]])?;
         Some((self.transmitted(&at, weight, &arrival, u[4])?, arrival.shadow))
     }
