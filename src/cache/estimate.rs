@@ -36,8 +36,14 @@ pub struct Gatherer {
 enum Prepared {
     Notes(Cache),
     Thinned(Box<Thinning>),
-    All(Columns),
-    Cut { tree: Tree, clusters: Option<Columns> },
+    All(Box<Columns>),
+    Cut(Box<Cutting>),
+}
+
+/// A tree, and what stands for its nodes where no random member does.
+struct Cutting {
+    tree: Tree,
+    clusters: Option<Columns>,
 }
 
 /// Working space of one task, for one model after the other.
@@ -69,9 +75,11 @@ impl Gatherer {
             Estimator::Cut | Estimator::Cluster if !plain => {
                 let tree = Tree::new(&Columns::of(model, &cache.lit));
                 let clusters = (estimator == Estimator::Cluster).then(|| tree.clusters(model));
-                Prepared::Cut { tree, clusters }
+                Prepared::Cut(Box::new(Cutting { tree, clusters }))
             }
-            Estimator::All | Estimator::Cut | Estimator::Cluster => Prepared::All(Columns::of(model, &cache.lit)),
+            Estimator::All | Estimator::Cut | Estimator::Cluster => {
+                Prepared::All(Box::new(Columns::of(model, &cache.lit)))
+            }
         };
         Self { attempted, prepared, tuning }
     }
@@ -106,7 +114,8 @@ impl Gatherer {
                 tally.evaluated += count;
                 out.extend(exits.iter().map(|exit| mean(columns.sum(model, exit, partition))));
             }
-            Prepared::Cut { tree, clusters } => {
+            Prepared::Cut(cutting) => {
+                let Cutting { tree, clusters } = &**cutting;
                 let mut sums = vec![[0.0; 3]; exits.len()];
                 let floor = floor * attempted as f32;
                 let cut = Cut { tree, clusters: clusters.as_ref(), model, envelope, error, floor, partition };

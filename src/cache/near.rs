@@ -4,7 +4,7 @@
 use super::{CachedSample, Envelope, Filler};
 use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor, Partition};
 use crate::geometry::SurfacePoint;
-use crate::math::{Frame, Rgb, Vec3, hash};
+use crate::math::{Frame, Rgb, Vec3, hash, unit_f32};
 use crate::query::{Ray, RayTally};
 use std::f32::consts::{PI, TAU};
 
@@ -14,8 +14,14 @@ const RINGS: usize = 80;
 const INNERMOST: f32 = 1e-8;
 /// Share of the samples that is spread evenly over the rings, lest a model differ from the envelope.
 const EVEN: f64 = 0.1;
-/// Chance of each axis that a disk is laid across: mostly the normal, so that steep walls are met along the others.
-const AXES: [f32; 3] = [0.5, 0.25, 0.25];
+/// Lines parallel to the normal.
+const LINES: u32 = 8;
+/// Number of lines parallel to each axis on average, the normal first: on a plane that alone finds all, steep walls need the
+/// others.
+const AXES: [f32; 3] = [LINES as f32, 0.5, 0.5];
+/// Steps between the numbers of one line and the next: powers of the root of x^6 = x + 1, a generalised golden ratio
+/// [Roberts 2018].
+const STEPS: [f32; 5] = [0.881_271_5, 0.776_639_4, 0.684_430_7, 0.603_168_7, 0.531_555_4];
 /// Surfaces that one probe finds at most.
 const MOST_HITS: u32 = 64;
 
@@ -58,21 +64,40 @@ impl NearField {
         Self { partition, radius, radii, cumulative }
     }
 
-    /// One estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for `exit`, seeded by `key`.
+    /// One estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for `exit`, seeded by `key`: all surfaces found along some lines
+    /// parallel to the normal, and along one parallel to a tangent, each over the density of them all.
     pub fn estimate(&self, filler: &Filler<'_>, exit: &Exit, key: u64, tally: &mut RayTally) -> Rgb {
-        let number =
-            |i: u64| (hash(key.wrapping_add((i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))) >> 40) as f32 / 16_777_216.0;
         let frame = Frame::about(exit.n);
         let axes = [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a));
-        let pick = number(0);
-        let chosen = if pick < AXES[0] { 0 } else { 1 + usize::from(pick >= AXES[0] + AXES[1]) };
+        let [turn, shift, across] = [0, 1, 2].map(|i| Numbers(key).at(i));
+        let mut sum = Rgb::BLACK;
+        for line in 0..LINES {
+            // Radii in equal shares of the light, directions a golden angle apart.
+            let radius = (line as f32 + Numbers(key).at(3 + u64::from(line))) / LINES as f32;
+            let angle = (turn + line as f32 * 0.618_034).fract();
+            sum += self.probe(filler, exit, (&axes, 0), [radius, angle], (key, line), tally);
+        }
+        let tangent = 1 + usize::from(across >= 0.5);
+        sum + self.probe(filler, exit, (&axes, tangent), [shift, turn], (!key, 0), tally)
+    }
+
+    /// What is found along a line parallel to one of the axes.
+    fn probe(
+        &self,
+        filler: &Filler<'_>,
+        exit: &Exit,
+        (axes, chosen): (&[Vec3; 3], usize),
+        [radius, angle]: [f32; 2],
+        (key, line): (u64, u32),
+        tally: &mut RayTally,
+    ) -> Rgb {
         let (axis, aside, other) = (axes[chosen], axes[(chosen + 1) % 3], axes[(chosen + 2) % 3]);
-        let r = self.ring(number(1));
-        let (sin, cos) = (TAU * number(2)).sin_cos();
+        let r = self.ring(radius);
+        let (sin, cos) = (TAU * angle).sin_cos();
         let middle = exit.x + (aside * cos + other * sin) * r;
         let half = (self.radius * self.radius - r * r).max(0.0).sqrt();
         let mut ray = Ray { origin: middle + axis * half, direction: -axis, t_min: 0.0, t_max: 2.0 * half };
-        let (mut sum, mut last) = (Rgb::BLACK, None);
+        let (mut sum, mut last, mut found) = (Rgb::BLACK, None, 0);
         for _ in 0..MOST_HITS {
             tally.bounce += 1;
             let Some(hit) = filler.rays.closest(&ray) else { break };
@@ -83,13 +108,16 @@ impl NearField {
                 continue;
             }
             let at = filler.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
-            let density = self.density(exit, &axes, &at);
-            let numbers: [f32; 5] = std::array::from_fn(|i| number(3 + u64::from(hit.triangle) * 8 + i as u64));
+            let density = self.density(exit, axes, &at);
+            // Lines spread over the lights together, as they do over the surface.
+            let u =
+                std::array::from_fn(|i| (Numbers(key).at(16 + found * 8 + i as u64) + line as f32 * STEPS[i]).fract());
+            found += 1;
             if density > 0.0
-                && let Some((sample, shadow)) = filler.entering(at, 1.0 / density, numbers)
+                && let Some((sample, shadow)) = filler.entering(at, 1.0 / density, u, tally)
             {
-                tally.shadow += 1;
-                if !filler.rays.occluded(&shadow) {
+                tally.shadow += u64::from(shadow.is_some());
+                if !shadow.is_some_and(|ray| filler.rays.occluded(&ray)) {
                     sum += filler.model.visit(Share { near: self, model: filler.model, sample: &sample, exit });
                 }
             }
@@ -124,6 +152,15 @@ impl NearField {
             chance * self.on_disk(r) * at.n_geometric.dot(axis).abs()
         };
         axes.iter().zip(AXES).map(of).sum()
+    }
+}
+
+/// Uniform numbers in [0, 1) by number.
+struct Numbers(u64);
+
+impl Numbers {
+    fn at(&self, i: u64) -> f32 {
+        unit_f32((hash(self.0.wrapping_add((i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))) >> 32) as u32)
     }
 }
 

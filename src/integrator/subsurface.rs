@@ -77,6 +77,7 @@ struct Body {
     envelope: Envelope,
     table: AreaTable,
     stream: CacheStream,
+    cosine_share: f32,
 }
 
 impl Subsurface {
@@ -85,19 +86,22 @@ impl Subsurface {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Result<Self> {
+        let lights = Lights::new(scene);
         let body = |(index, object): (usize, &crate::scene::Object)| {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
             let stream = CacheStream::new(options.points, options.seed, index as u64);
             let model = t.build()?;
             let envelope = Envelope::new(&model, &t.medium);
-            Ok(Some(Body { medium: t.medium, model, envelope, table, stream }))
+            let cosine_share = object.mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds));
+            Ok(Some(Body { medium: t.medium, model, envelope, table, stream, cosine_share }))
         };
+        let bodies = scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?;
         Ok(Self {
             options,
-            light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
+            light: DirectLight { lights, samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
-            bodies: scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?,
+            bodies,
             plans: OnceLock::new(),
         })
     }
@@ -113,6 +117,7 @@ impl Subsurface {
             model: &body.model,
             eta: body.medium.eta,
             sampling: self.options.entry,
+            cosine_share: body.cosine_share,
             stream: &body.stream,
             density,
         }
