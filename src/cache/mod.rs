@@ -41,7 +41,8 @@ pub struct CachedSample {
 }
 
 /// What gathering cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct GatherTally {
     /// Samples attempted by all fills.
     pub samples: u64,
@@ -55,6 +56,10 @@ pub struct GatherTally {
     pub pairs: u64,
     /// Pairs where S_d was evaluated: those kept by rejection control, all of a plain sum, or those in a cut.
     pub evaluated: u64,
+    /// Samples left out because a number of theirs is NaN or infinite.
+    pub non_finite: u64,
+    /// Values of S_d below zero that were taken as 0, one for each pair and channel.
+    pub clamped: u64,
 }
 
 impl std::ops::AddAssign for GatherTally {
@@ -65,5 +70,7 @@ impl std::ops::AddAssign for GatherTally {
         self.nodes += other.nodes;
         self.pairs += other.pairs;
         self.evaluated += other.evaluated;
+        self.non_finite += other.non_finite;
+        self.clamped += other.clamped;
     }
 }

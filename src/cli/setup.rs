@@ -72,7 +72,7 @@ pub struct Prepared {
     pub method: Method,
     pub backend: Backend,
     pub seed: u64,
-    as_notes: bool,
+    pub as_notes: bool,
     estimator: Estimator,
 }
 
@@ -117,6 +117,27 @@ pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
 }
 
 impl MethodArgs {
+    /// The options as they are typed, for a line that runs the same again.
+    pub fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        let mut put = |option: &str, value: Option<String>| {
+            if let Some(value) = value {
+                words.extend([option.to_string(), value]);
+            }
+        };
+        put("--method", self.method.map(|m| m.name().into()));
+        put("--model", self.model.map(|m| m.name().into()));
+        put("--estimator", self.estimator.map(|e| e.name().into()));
+        put("--backend", self.backend.map(|b| b.name().into()));
+        for define in &self.define {
+            put("-D", Some(format!("'{define}'")));
+        }
+        if self.as_notes {
+            words.push("--as-notes".into());
+        }
+        words
+    }
+
     /// The options as keys of the scene file, so that messages, warnings and file headers know them; `-D` comes last.
     fn overrides(&self) -> Vec<String> {
         let mut keys = Vec::new();
