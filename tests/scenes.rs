@@ -8,7 +8,7 @@ use marmor::optics::{FresnelMoments, reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile};
+use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -193,6 +193,7 @@ fn subsurface(seed: u64) -> SubsurfaceOptions {
         cache_samples: 4096,
         estimator: Estimator::Notes,
         cut_error: 0.03,
+        spread: Spread::Seen,
         entry: EntrySampling::Light,
         points: Points::Sobol,
         specular: false,

@@ -24,6 +24,8 @@ pub struct Fall {
 /// [`Fall`] by distance.
 pub struct Envelope {
     rows: Vec<Fall>,
+    /// Decay per channel [1/unit].
+    decay: [f32; 3],
     /// Variation of S_d over members of a node that does not come from the distance, relative: from directions or depths.
     pub other: f32,
 }
@@ -53,7 +55,21 @@ impl Envelope {
                 fall
             })
             .collect();
-        Self { rows, other }
+        Self { rows, decay: medium.sigma_tr().0, other }
+    }
+
+    /// S_d at √`r2` ≥ 0 of media made so clear that their decay lengths are at least `least` [unit], up to a common factor.
+    #[inline]
+    pub fn widened(&self, r2: f32, least: f32) -> Vec4 {
+        let scale = self.decay.map(|decay| if decay * least > 1.0 { 1.0 / (decay * least) } else { 1.0 });
+        if scale == [1.0; 3] {
+            return self.at(r2).value;
+        }
+        let mut value = Vec4::ZERO;
+        for c in 0..3 {
+            value[c] = self.at(r2 * scale[c] * scale[c]).value[c];
+        }
+        value
     }
 
     /// At the largest tabulated distance up to √`r2`, `r2` ≥ 0 [unit²].

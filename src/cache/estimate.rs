@@ -1,6 +1,6 @@
 //! The estimators by name: what each prepares once a pass, and the sum at an exit.
 
-use super::{Buffer, Cache, Columns, Envelope, GatherTally, Tree, cut, notes};
+use super::{Buffer, Cache, Columns, Cut, Envelope, GatherTally, Tree, notes};
 use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
 use crate::math::Rgb;
 use crate::scene::Estimator;
@@ -51,34 +51,40 @@ impl Gatherer {
         Self { attempted, prepared, error }
     }
 
-    /// (1/M) Σ S_d L_t to `exit`. `key` seeds what is random; the same arguments give the same bits.
+    /// (1/M) Σ S_d L_t to each of `exits`, into `out`. `keys`, one for each exit, seed what is random; the same arguments
+    /// give the same bits.
     pub fn gather(
         &self,
-        model: &Model,
-        envelope: &Envelope,
-        exit: &Exit,
-        key: u64,
+        (model, envelope): (&Model, &Envelope),
+        exits: &[Exit],
+        keys: &[u64],
         scratch: &mut Scratch,
         tally: &mut GatherTally,
-    ) -> Rgb {
-        let sum = match &self.prepared {
-            Prepared::Notes(cache) => return model.visit(Notes { cache, exit, key, tally }),
+        out: &mut Vec<Rgb>,
+    ) {
+        out.clear();
+        tally.exits += exits.len() as u64;
+        let mean = |sum: [f64; 3]| Rgb::from_fn(|c| (sum[c] / f64::from(self.attempted)) as f32);
+        match &self.prepared {
+            Prepared::Notes(cache) => {
+                out.extend(exits.iter().zip(keys).map(|(exit, &key)| model.visit(Notes { cache, exit, key, tally })));
+            }
             Prepared::All(columns) => {
-                let count = columns.len() as u64;
+                let count = columns.len() as u64 * exits.len() as u64;
                 tally.pairs += count;
                 tally.evaluated += count;
-                columns.sum(model, exit)
+                out.extend(exits.iter().map(|exit| mean(columns.sum(model, exit))));
             }
             Prepared::Cut(tree) => {
-                let (sum, work) = cut(tree, model, envelope, exit, self.error, key, scratch.buffer(model));
+                let mut sums = vec![[0.0; 3]; exits.len()];
+                let cut = Cut { tree, model, envelope, error: self.error };
+                let work = cut.sums(exits, keys, scratch.buffer(model), &mut sums);
                 tally.nodes += work.nodes;
                 tally.pairs += work.evaluated;
                 tally.evaluated += work.evaluated;
-                sum
+                out.extend(sums.into_iter().map(mean));
             }
-        };
-        tally.exits += 1;
-        Rgb::from_fn(|c| (sum[c] / f64::from(self.attempted)) as f32)
+        }
     }
 }
 

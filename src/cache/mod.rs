@@ -3,6 +3,7 @@
 
 mod columns;
 mod cut;
+mod density;
 mod envelope;
 mod estimate;
 mod fill;
@@ -12,7 +13,8 @@ mod tree;
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
 pub use columns::Columns;
-pub use cut::{Buffer, CutWork, cut};
+pub use cut::{Buffer, Cut, CutWork};
+pub use density::{Density, Seen, seen};
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Gatherer, PLAIN_SUM, Scratch};
 pub use fill::Filler;

@@ -21,7 +21,6 @@ pub fn notes<B: Bssrdf>(cache: &Cache, model: &B, exit: &Exit, key: u64, tally: 
             }
         }
     }
-    tally.exits += 1;
     tally.pairs += cache.lit.len() as u64;
     tally.evaluated += evaluated;
     Rgb::from_fn(|c| (sum[c] / f64::from(cache.attempted.max(1))) as f32)

@@ -5,7 +5,7 @@ use marmor::integrator::{AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceO
 use marmor::query::Backend;
 use marmor::sampling::Points;
 use marmor::scene::{
-    DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Surface,
+    DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Spread, Surface,
 };
 use marmor::{Error, Result};
 use std::path::Path;
@@ -176,6 +176,7 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
                 cut_error: options.cut_error.map_or(DEFAULT_CUT_ERROR, |e| e as f32),
                 entry,
                 points,
+                spread: if as_notes { Spread::Area } else { options.spread.unwrap_or(Spread::Seen) },
                 specular: options.specular.unwrap_or(true),
                 light_samples,
                 seed,

@@ -99,8 +99,14 @@ pub trait Integrator: Sync {
     /// Prepares pass number `pass`.
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass;
 
-    /// Radiance along each ray. Pure: the same arguments give the same bytes on any thread.
+    /// Radiance along each ray of a tile. Pure: the same arguments give the same bytes on any thread.
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally);
+
+    /// True if the rays of one call share work, so that a pixel's bytes depend on which others come with it: the
+    /// renderer then always hands over whole tiles.
+    fn shares_tiles(&self) -> bool {
+        false
+    }
 
     /// What was built for this scene, and what was left out.
     fn parts(&self, scene: &Scene) -> Vec<Part>;

@@ -4,7 +4,7 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model};
-use crate::cache::{Envelope, Filler, Gatherer, PLAIN_SUM, Scratch};
+use crate::cache::{Density, Envelope, Filler, Gatherer, PLAIN_SUM, Scratch, Seen, seen};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -12,7 +12,8 @@ use crate::math::{Rgb, Vec3};
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{CacheStream, PixelStream, Points};
-use crate::scene::{EntrySampling, Estimator, Scene, Surface};
+use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface};
+use std::sync::OnceLock;
 
 /// Options of [`Subsurface`].
 #[derive(Clone, Copy, Debug)]
@@ -25,8 +26,10 @@ pub struct SubsurfaceOptions {
     pub cut_error: f32,
     /// How directions of entering light are picked.
     pub entry: EntrySampling,
-    /// How points on the surface are spread.
+    /// What numbers pick the points on the surface.
     pub points: Points,
+    /// How the points are spread over the surface.
+    pub spread: Spread,
     /// Whether smooth surfaces mirror lights and environment.
     pub specular: bool,
     /// Samples of each kind of light per diffuse point.
@@ -43,6 +46,8 @@ pub struct Subsurface {
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
     bodies: Vec<Option<Body>>,
+    /// Where each body's samples are spent; known with the first pass.
+    densities: OnceLock<Vec<Density>>,
 }
 
 /// A translucent object.
@@ -73,37 +78,87 @@ impl Subsurface {
             light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
             bodies: scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?,
+            densities: OnceLock::new(),
         })
     }
 
-    fn shade(
+    /// What fills the cache of object number `object`.
+    fn filler<'a>(&'a self, view: View<'a>, object: usize, body: &'a Body, density: &'a Density) -> Filler<'a> {
+        Filler {
+            scene: view.scene,
+            rays: view.rays,
+            lights: &self.light.lights,
+            object: object as u32,
+            table: &body.table,
+            model: &body.model,
+            eta: body.medium.eta,
+            sampling: self.options.entry,
+            stream: &body.stream,
+            density,
+        }
+    }
+
+    /// Where each body's samples are spent. A function of scene and seed: the same for any pass that asks first.
+    fn densities(&self, view: View<'_>) -> Vec<Density> {
+        // With directions by the cosine most trials would miss the lights.
+        if self.options.spread == Spread::Area || self.options.entry == EntrySampling::Cosine {
+            return self.bodies.iter().map(|_| Density::even()).collect();
+        }
+        let even = Density::even();
+        let density = |(object, (body, seen)): (usize, (&Option<Body>, Vec<Seen>))| {
+            let Some(body) = body else { return Density::even() };
+            let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
+            let filler = Filler { stream: &stream, ..self.filler(view, object, body, &even) };
+            Density::seen(&filler, &body.envelope, &seen)
+        };
+        self.bodies.iter().zip(seen(view.scene, view.rays)).enumerate().map(density).collect()
+    }
+
+    /// What leaves through the surface at each translucent hit; exits of one object are gathered together.
+    fn inside(
         &self,
         view: View<'_>,
         pass: &[Option<Gatherer>],
-        ray: &CameraRay,
-        hit: &Hit,
-        scratch: &mut Scratch,
+        rays: &[CameraRay],
+        hits: &[Option<Hit>],
         tally: &mut Tally,
-    ) -> Rgb {
+    ) -> Vec<Rgb> {
+        let mut inside = vec![Rgb::BLACK; rays.len()];
+        let object = |i: usize| hits[i].as_ref().map(|hit| hit.mesh as usize).filter(|&o| self.bodies[o].is_some());
+        let mut translucent: Vec<(usize, usize)> = (0..rays.len()).filter_map(|i| Some((object(i)?, i))).collect();
+        translucent.sort_unstable();
+        let (mut scratch, mut found) = (Scratch::default(), Vec::new());
+        for group in translucent.chunk_by(|a, b| a.0 == b.0) {
+            let (Some(body), Some(gatherer)) = (&self.bodies[group[0].0], &pass[group[0].0]) else { continue };
+            let exit = |&(_, i): &(usize, usize)| {
+                let (w, hit) = (-rays[i].ray.direction, hits[i].as_ref()?);
+                let at = view.point(hit, rays[i].ray.direction);
+                Some(Exit { x: at.x, n: at.normal_seen_from(w), w })
+            };
+            let exits: Vec<Exit> = group.iter().filter_map(exit).collect();
+            let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
+            gatherer.gather((&body.model, &body.envelope), &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
+            for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
+                inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));
+            }
+        }
+        inside
+    }
+
+    fn shade(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, inside: Rgb, tally: &mut Tally) -> Rgb {
         let at = view.point(hit, ray.ray.direction);
         let mut stream = ray.stream;
         let object = hit.mesh as usize;
-        let (Some(body), Some(gatherer)) = (&self.bodies[object], &pass[object]) else {
+        let Some(body) = &self.bodies[object] else {
             return emitted(view.scene, hit, ray.ray.direction)
                 + self.light.reflected(view, &at, self.albedo[object], &mut stream, tally);
         };
+        if !self.options.specular {
+            return inside;
+        }
         let w = -ray.ray.direction;
-        let eta = body.medium.eta;
         let n = at.normal_seen_from(w);
-        let mu = n.dot(w);
-        let exit = Exit { x: at.x, n, w };
-        let inside = gatherer.gather(&body.model, &body.envelope, &exit, stream.key(), scratch, &mut tally.gather);
-        let mirrored = if self.options.specular {
-            self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(eta, mu)
-        } else {
-            Rgb::BLACK
-        };
-        inside * transmittance(eta, mu) + mirrored
+        inside + self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(body.medium.eta, n.dot(w))
     }
 
     fn tree_part(&self, name: &str) -> Part {
@@ -142,19 +197,10 @@ impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        let densities = self.densities.get_or_init(|| self.densities(view));
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
-            let filler = Filler {
-                scene: view.scene,
-                rays: view.rays,
-                lights: &self.light.lights,
-                object: object as u32,
-                table: &body.table,
-                model: &body.model,
-                eta: body.medium.eta,
-                sampling: self.options.entry,
-                stream: &body.stream,
-            };
+            let filler = self.filler(view, object, body, &densities[object]);
             let count = self.options.cache_samples;
             let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
             tally.gather.samples += u64::from(count);
@@ -166,13 +212,17 @@ impl Integrator for Subsurface {
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = view.camera_hits(rays, tally);
-        let mut scratch = Scratch::default();
-        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+        let inside = self.inside(view, pass, rays, &hits, tally);
+        for (((ray, hit), inside), out) in rays.iter().zip(&hits).zip(inside).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(),
-                Some(hit) => self.shade(view, pass, ray, hit, &mut scratch, tally),
+                Some(hit) => self.shade(view, ray, hit, inside, tally),
             };
         }
+    }
+
+    fn shares_tiles(&self) -> bool {
+        self.options.estimator == Estimator::Cut
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {

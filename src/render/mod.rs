@@ -215,9 +215,10 @@ fn render_tile<I: Integrator>(
 ) -> (Vec<Rgb>, Tally) {
     let camera = &view.scene.camera;
     let width = u64::from(camera.resolution[0]);
-    let mut rays = Vec::with_capacity(tile.area());
-    for y in tile.y0..tile.y1 {
-        for x in tile.x0..tile.x1 {
+    let whole = if integrator.shares_tiles() { whole_tile(tile, camera.resolution) } else { tile };
+    let mut rays = Vec::with_capacity(whole.area());
+    for y in whole.y0..whole.y1 {
+        for x in whole.x0..whole.x1 {
             let mut stream = PixelStream::new(job.seed, u64::from(y) * width + u64::from(x), pass);
             let ray = camera.ray([x, y], stream.next_2d());
             rays.push(CameraRay { ray, stream });
@@ -225,16 +226,28 @@ fn render_tile<I: Integrator>(
     }
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);
+    if whole != tile {
+        let kept = |i: usize| {
+            let width = whole.width();
+            let (x, y) = (whole.x0 + (i % width) as u32, whole.y0 + (i / width) as u32);
+            (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y)
+        };
+        out = out.into_iter().enumerate().filter(|&(i, _)| kept(i)).map(|(_, sample)| sample).collect();
+    }
     (out, tally)
 }
 
-/// `window` cut into tiles, row by row.
+/// The tile of the whole picture that `tile` of a crop lies in.
+fn whole_tile(tile: Window, resolution: [u32; 2]) -> Window {
+    let [x0, y0] = [tile.x0, tile.y0].map(|v| v / TILE * TILE);
+    Window { x0, y0, x1: (x0 + TILE).min(resolution[0]), y1: (y0 + TILE).min(resolution[1]) }
+}
+
+/// `window` cut into tiles along the grid of the whole picture, row by row.
 fn tiles(window: Window) -> Vec<Window> {
-    let mut tiles = Vec::new();
-    for y0 in (window.y0..window.y1).step_by(TILE as usize) {
-        for x0 in (window.x0..window.x1).step_by(TILE as usize) {
-            tiles.push(Window { x0, y0, x1: (x0 + TILE).min(window.x1), y1: (y0 + TILE).min(window.y1) });
-        }
-    }
-    tiles
+    let cuts = |from: u32, to: u32| {
+        (from / TILE..to.div_ceil(TILE)).map(move |i| ((i * TILE).max(from), ((i + 1) * TILE).min(to)))
+    };
+    let row = |(y0, y1)| cuts(window.x0, window.x1).map(move |(x0, x1)| Window { x0, y0, x1, y1 });
+    cuts(window.y0, window.y1).flat_map(row).collect()
 }

@@ -246,6 +246,7 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         "cut_error",
         "model",
         "entry",
+        "spread",
         "specular",
     ];
     m.only("[method]", &keys)?;
@@ -260,6 +261,7 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
             .get("cut_error", "a number from 1e-4 to 1", |n| n.number().filter(|v| (1e-4..=1.0).contains(v)))?,
         model: named_value(&m, "model")?,
         entry: named_value(&m, "entry")?,
+        spread: named_value(&m, "spread")?,
         specular: switch(&m, "specular")?,
     })
 }

@@ -85,6 +85,15 @@ named! {
     Cosine = "cosine"
 }
 
+named! {
+    /// How the points of the cache are spread over a surface.
+    Spread, "way to spread samples",
+    /// More where light enters that the camera gets to see.
+    Seen = "seen",
+    /// Evenly.
+    Area = "area"
+}
+
 /// `[method]`: what is computed. Everything may be absent; the integrator knows the defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MethodOptions {
@@ -106,6 +115,8 @@ pub struct MethodOptions {
     pub model: Option<ModelName>,
     /// Subsurface: how light is sampled where it enters; by the scene if absent.
     pub entry: Option<EntrySampling>,
+    /// Subsurface: how entry points are spread.
+    pub spread: Option<Spread>,
     /// Subsurface: add the mirror reflection at the boundary.
     pub specular: Option<bool>,
 }
