@@ -39,6 +39,8 @@ pub struct CutWork {
     pub nodes: u64,
     /// Pairs at which S_d was evaluated.
     pub evaluated: u64,
+    /// Values of S_d below zero that counted as 0.
+    pub clamped: u64,
 }
 
 /// A cut's tree, model and how coarse it may be.
@@ -155,7 +157,7 @@ impl Cut<'_> {
         work.evaluated += buffer.picked.len() as u64 * order.len() as u64;
         buffer.columns.pick(&self.tree.columns, &buffer.picked);
         for &i in order {
-            out[i as usize] = buffer.columns.sum(self.model, &exits[i as usize]);
+            out[i as usize] = buffer.columns.sum(self.model, &exits[i as usize], &mut work.clamped);
         }
     }
 

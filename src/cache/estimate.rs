@@ -73,7 +73,7 @@ impl Gatherer {
                 let count = columns.len() as u64 * exits.len() as u64;
                 tally.pairs += count;
                 tally.evaluated += count;
-                out.extend(exits.iter().map(|exit| mean(columns.sum(model, exit))));
+                out.extend(exits.iter().map(|exit| mean(columns.sum(model, exit, &mut tally.clamped))));
             }
             Prepared::Cut(tree) => {
                 let mut sums = vec![[0.0; 3]; exits.len()];
@@ -82,6 +82,7 @@ impl Gatherer {
                 tally.nodes += work.nodes;
                 tally.pairs += work.evaluated;
                 tally.evaluated += work.evaluated;
+                tally.clamped += work.clamped;
                 out.extend(sums.into_iter().map(mean));
             }
         }

@@ -69,7 +69,7 @@ impl Filler<'_> {
         let lit = |number: u64| {
             let (sample, shadow) = self.candidate(number)?;
             let place = self.density.place(self.stream.numbers(number).0).0;
-            (!self.rays.occluded(&shadow)).then_some((place, sample))
+            (sample.is_finite() && !self.rays.occluded(&shadow)).then_some((place, sample))
         };
         (0..u64::from(count)).into_par_iter().filter_map(lit).collect()
     }

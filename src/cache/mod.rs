@@ -42,6 +42,14 @@ pub struct CachedSample {
     pub flux: Rgb,
 }
 
+impl CachedSample {
+    /// True where no number is NaN or infinite: one that is would spoil the gathering at every exit of the pass.
+    pub fn is_finite(&self) -> bool {
+        let Entry { x, n, w } = self.entry;
+        x.is_finite() && n.is_finite() && w.is_finite() && self.depth.is_finite() && self.flux.is_finite()
+    }
+}
+
 /// What gathering cost.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]

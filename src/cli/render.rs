@@ -98,7 +98,12 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;
 
     pool.install(|| {
-        let prepared = prepare(&args.scene, &args.method)?;
+        let file = args.method.read(&args.scene)?;
+        let resolution = file.camera.resolution;
+        let window = args.crop.unwrap_or(Window::full(resolution));
+        // Before meshes are read, which may take long.
+        Film::require_memory(window)?;
+        let prepared = prepare(file, &args.method)?;
         let scene = &prepared.scene;
         for warning in &scene.warnings {
             if verbosity > Verbosity::Quiet {
@@ -108,8 +113,6 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
         let rays = query::build(prepared.backend, &meshes)?;
         let view = View { scene, rays: &*rays };
-        let resolution = scene.camera.resolution;
-        let window = args.crop.unwrap_or(Window::full(resolution));
         let cancel = cancel_on_signals();
         let job = Job {
             seed: prepared.seed,

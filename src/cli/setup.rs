@@ -32,6 +32,9 @@ pub struct MethodArgs {
     /// Seed of all random numbers [default: the scene's, else 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Mend meshes before use: no triangles without area or there twice, faces turned outwards
+    #[arg(long)]
+    repair: bool,
     /// Override a value of the scene file, such as camera.fov=30 or material.wax.eta=1.4; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
@@ -97,10 +100,9 @@ impl Prepared {
     }
 }
 
-/// Reads and checks a scene, and builds the tables of its method.
-pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
-    let file = SceneFile::read(path)?.with(&args.overrides())?;
-    let mut scene = Scene::load(&file)?;
+/// Reads the meshes of a scene and checks it, and builds the tables of its method.
+pub fn prepare(file: SceneFile, args: &MethodArgs) -> Result<Prepared> {
+    let mut scene = Scene::load_with(&file, args.repair)?;
     if args.as_notes {
         for material in &mut scene.materials {
             if let Surface::Translucent(t) = &mut material.surface {
@@ -117,6 +119,11 @@ pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
 }
 
 impl MethodArgs {
+    /// The scene file with the options in it.
+    pub fn read(&self, path: &Path) -> Result<SceneFile> {
+        SceneFile::read(path)?.with(&self.overrides())
+    }
+
     /// The options as they are typed, for a line that runs the same again.
     pub fn words(&self) -> Vec<String> {
         let mut words = Vec::new();
@@ -131,6 +138,9 @@ impl MethodArgs {
         put("--backend", self.backend.map(|b| b.name().into()));
         for define in &self.define {
             put("-D", Some(format!("'{define}'")));
+        }
+        if self.repair {
+            words.push("--repair".into());
         }
         if self.as_notes {
             words.push("--as-notes".into());

@@ -8,7 +8,6 @@ mod exact;
 mod exr_file;
 mod exr_read;
 mod image;
-mod memory;
 pub mod metrics;
 mod output;
 mod png_file;

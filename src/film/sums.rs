@@ -1,10 +1,9 @@
 //! The film: what the samples of each pixel add up to.
 
 use super::exact::{Exact, MOST, PLACES};
-use super::memory;
 use super::{Image, Window};
 use crate::math::Rgb;
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Result, memory};
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 use std::ops::Range;
@@ -207,7 +206,7 @@ impl Film {
     ///
     /// # Errors
     /// Usage if the window is empty or leaves the picture; Memory if the sums are more than what is available,
-    /// known before anything is allocated where the system tells (`MemAvailable` of Linux).
+    /// known before anything is allocated where the system tells (Linux: [`memory::available`]).
     pub fn new(resolution: [u32; 2], window: Window) -> Result<Self> {
         let [width, height] = resolution;
         if window.is_empty() || !Window::full(resolution).contains(window) {
@@ -215,17 +214,27 @@ impl Film {
                 "the window {window} (x0,y0,x1,y1; x1 and y1 excluded) is empty or leaves the picture of {width}x{height} pixels"
             )));
         }
-        let what = format!("the film of {}x{} pixels", window.width(), window.height());
-        let remedy = "render a smaller picture, or parts of it by --crop";
-        let needed = window.area() as u128 * Self::BYTES_PER_PIXEL as u128;
-        memory::require(needed, memory::available(), &what, remedy)?;
+        Self::require_memory(window)?;
         let mut sums = Vec::new();
         sums.try_reserve_exact(window.area()).map_err(|_| {
-            let needed = memory::gigabytes(needed);
-            Error::new(ErrorKind::Memory, format!("{what} needs {needed}, which the system refuses; {remedy}"))
+            let needed = memory::gigabytes(window.area() as u128 * Self::BYTES_PER_PIXEL as u128);
+            let what = format!("the film of {}x{} pixels needs {needed}", window.width(), window.height());
+            Error::new(ErrorKind::Memory, format!("{what}, which the system refuses; {}", Self::REMEDY))
         })?;
         sums.resize(window.area(), Sums::default());
         Ok(Self { resolution, window, sums, ranges: vec![0..0], counts: Counts::default() })
+    }
+
+    const REMEDY: &str = "render a smaller picture, or parts of it by --crop";
+
+    /// Whether a film of `window` would fit into memory, before anything else is done for it.
+    ///
+    /// # Errors
+    /// Memory if not, with both numbers.
+    pub fn require_memory(window: Window) -> Result<()> {
+        let what = format!("the film of {}x{} pixels", window.width(), window.height());
+        let needed = window.area() as u128 * Self::BYTES_PER_PIXEL as u128;
+        memory::require(needed, memory::available(), &what, Self::REMEDY)
     }
 
     /// The same film, still empty, whose first pass is number `pass`.

@@ -90,6 +90,12 @@ impl Mesh {
         if n.dot(n_geometric) < 0.0 { -n } else { n }
     }
 
+    /// Memory of vertices, triangles and normals.
+    pub fn bytes(&self) -> usize {
+        let normals = self.normals.as_ref().map_or(0, |n| size_of_val(&*n.vectors) + size_of_val(&*n.triangles));
+        size_of_val(&*self.positions) + size_of_val(&*self.triangles) + normals
+    }
+
     /// A hash of every bit of the mesh.
     pub fn fingerprint(&self) -> u64 {
         let point = |state: u64, p: &Vec3| p.to_array().iter().fold(state, |s, x| hash_combine(s, x.to_bits().into()));

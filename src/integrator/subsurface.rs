@@ -4,7 +4,7 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model};
-use crate::cache::{Density, Envelope, Filler, Gatherer, PLAIN_SUM, Scratch, Seen, seen};
+use crate::cache::{CachedSample, Density, Envelope, Filler, Gatherer, PLAIN_SUM, Scratch, Seen, seen};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -202,7 +202,10 @@ impl Integrator for Subsurface {
             let body = body.as_ref()?;
             let filler = self.filler(view, object, body, &densities[object]);
             let count = self.options.cache_samples;
-            let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let mut cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let all = cache.lit.len();
+            cache.lit.retain(CachedSample::is_finite);
+            tally.gather.non_finite += (all - cache.lit.len()) as u64;
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
             Some(Gatherer::new(self.options.estimator, cache, &body.model, self.options.cut_error))
