@@ -92,6 +92,11 @@ pub trait Bssrdf: Sync {
     /// conserves energy.
     fn total(&self) -> Rgb;
 
+    /// Whether the formula is below zero in places, where [`Self::eval`] has 0.
+    fn clamps(&self) -> bool {
+        false
+    }
+
     /// What the model promises; tests hold it to that.
     fn claims(&self) -> Claims {
         Claims::default()

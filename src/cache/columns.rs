@@ -1,7 +1,7 @@
 //! Cached samples in columns, as the vectorised sums of the models want them.
 
 use super::CachedSample;
-use crate::bssrdf::{Bssrdf, DirectionColumns, Entry, EntryColumns, Exit, Model, Partition, SourceColumns};
+use crate::bssrdf::{DirectionColumns, Entry, EntryColumns, Exit, Model, Partition, Slab, SourceColumns};
 use crate::math::Vec3;
 
 /// Columns a model may need: point, weight, and two of a source or six of directions.
@@ -159,8 +159,9 @@ impl Columns {
     }
 
     /// Σ S_d · weight per channel over all samples, by the vectorised code of `model` where it has one; of S_d the part
-    /// that is far by `partition`, from the points of the columns.
-    pub fn sum(&self, model: &Model, exit: &Exit, partition: Partition) -> [f64; 3] {
+    /// that is far by `partition`, from the points of the columns. Values of S_d below zero, which count as 0, add to
+    /// `clamped`.
+    pub fn sum(&self, model: &Model, exit: &Exit, partition: Partition, clamped: &mut u64) -> [f64; 3] {
         let c = &self.columns;
         let entries = EntryColumns { x: &c[0], y: &c[1], z: &c[2], weight: [&c[3], &c[4], &c[5]], partition };
         if let Some(model) = model.gather() {
@@ -173,25 +174,28 @@ impl Columns {
             }
             Model::Directional(dipole) => {
                 let directions = DirectionColumns { n: [&c[6], &c[7], &c[8]], w: [&c[9], &c[10], &c[11]] };
-                dipole.gather(exit.x, exit.n, entries, directions)
+                let (sum, below_zero) = dipole.gather(exit.x, exit.n, entries, directions);
+                *clamped += below_zero;
+                sum
             }
-            Model::Slab(slab) => self.plain(&**slab, exit, partition),
+            Model::Slab(slab) => self.plain(slab, exit, partition, clamped),
             // Those that know the distance alone have been summed above.
             Model::Standard(_) | Model::Better(_) | Model::Normalised(_) => [0.0; 3],
         }
     }
 
-    /// A loop over pairs, for models with columns of normals and directions and no vectorised sum.
-    fn plain<B: Bssrdf>(&self, model: &B, exit: &Exit, partition: Partition) -> [f64; 3] {
+    /// A loop over pairs: a slab has columns of normals and directions and no vectorised sum.
+    fn plain(&self, slab: &Slab, exit: &Exit, partition: Partition, clamped: &mut u64) -> [f64; 3] {
         let (mut sum, c) = ([0.0; 3], &self.columns);
         let vector = |k: usize, i: usize| Vec3::new(c[k][i], c[k + 1][i], c[k + 2][i]);
         for i in 0..self.len() {
             let entry = Entry { x: self.point(i), n: vector(LEAST, i), w: vector(LEAST + 3, i) };
-            let s = model.eval(&entry, exit);
+            let s = slab.eval_signed(&entry, exit);
             let far = partition.far(entry.x.distance_squared(exit.x));
             let weight = self.weight(i);
             for c in 0..3 {
-                sum[c] += f64::from(s[c] * weight[c] * far);
+                *clamped += u64::from(s[c] < 0.0 && weight[c] > 0.0);
+                sum[c] += f64::from(s[c].max(0.0) * weight[c] * far);
             }
         }
         sum

@@ -48,6 +48,8 @@ pub struct CutWork {
     pub nodes: u64,
     /// Pairs at which S_d was evaluated.
     pub evaluated: u64,
+    /// Values of S_d below zero that counted as 0.
+    pub clamped: u64,
 }
 
 /// A cut's tree, model and how coarse it may be.
@@ -178,9 +180,9 @@ impl Cut<'_> {
         buffer.columns.pick(&self.tree.columns, &buffer.picked);
         for &i in order {
             let exit = &exits[i as usize];
-            let mut sum = buffer.columns.sum(self.model, exit, self.partition);
+            let mut sum = buffer.columns.sum(self.model, exit, self.partition, &mut work.clamped);
             if self.clusters.is_some() {
-                let far = buffer.clusters.sum(self.model, exit, self.partition);
+                let far = buffer.clusters.sum(self.model, exit, self.partition, &mut work.clamped);
                 sum.iter_mut().zip(far).for_each(|(sum, far)| *sum += far);
             }
             out[i as usize] = sum;

@@ -72,7 +72,8 @@ impl Filler<'_> {
             let (at, weight, u) = self.point(number);
             let place = self.density.place(self.stream.numbers(number).0).0;
             let (sample, shadow) = self.entering(at, weight, u, &mut RayTally::default())?;
-            (!shadow.is_some_and(|ray| self.rays.occluded(&ray))).then_some((place, sample))
+            let hidden = shadow.is_some_and(|ray| self.rays.occluded(&ray));
+            (sample.is_finite() && !hidden).then_some((place, sample))
         };
         (0..u64::from(count)).into_par_iter().filter_map(lit).collect()
     }

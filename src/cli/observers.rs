@@ -80,7 +80,11 @@ impl Observer for ProgressDisplay {
 
 /// The share of the job that is done, by whichever limit comes first.
 fn fraction_done(progress: &Progress<'_>) -> f64 {
-    let by_passes = progress.job.passes.map_or(0.0, |n| f64::from(progress.film.passes()) / f64::from(n));
+    let film = progress.film;
+    let by_passes = progress
+        .job
+        .passes
+        .map_or(0.0, |n| f64::from(film.passes()) / f64::from(n.saturating_sub(film.ranges()[0].start).max(1)));
     let by_time = progress.job.time.map_or(0.0, |t| progress.seconds.total() / t.as_secs_f64());
     by_passes.max(by_time).min(1.0)
 }
@@ -123,7 +127,7 @@ impl Observer for Records {
             gather: progress.tally.gather,
             error,
             non_finite: 0,
-            clamped: 0,
+            clamped: progress.tally.gather.clamped,
             negative: 0,
         };
         self.file.append(&record.with_counts(&progress.film.counts()))

@@ -1,8 +1,8 @@
 //! Reading OpenEXR of any layout: scan lines or tiles, half or float, one part or several, with layers or without.
 
-use super::{Attribute, Image, Window, memory};
+use super::{Attribute, Image, Window};
 use crate::math::Rgb;
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Result, memory};
 use exr::prelude as exr;
 use exr::{ReadChannels, ReadLayers};
 use std::collections::BTreeMap;

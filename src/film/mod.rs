@@ -3,10 +3,11 @@
 //! Read first: `sums.rs` (the film), then `output.rs` (saving). docs/output.md tells users what is in the files.
 
 mod atomic;
+mod checkpoint;
+mod exact;
 mod exr_file;
 mod exr_read;
 mod image;
-mod memory;
 pub mod metrics;
 mod output;
 mod png_file;
@@ -14,6 +15,7 @@ mod sums;
 mod window;
 
 pub use atomic::write_atomically;
+pub use checkpoint::{Checkpoint, Identity};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::Image;

@@ -13,6 +13,8 @@ pub enum Format {
     Exr,
     /// 8 bits per channel, for looking at.
     Png,
+    /// The sums themselves, to go on with or to merge: see [`super::Checkpoint`].
+    Film,
 }
 
 impl Format {
@@ -25,8 +27,10 @@ impl Format {
         match ending.as_deref() {
             Some("exr") => Ok(Self::Exr),
             Some("png") => Ok(Self::Png),
+            Some("film") => Ok(Self::Film),
             _ => Err(Error::usage(format!(
-                "{}: the name of a picture ends in .exr (linear, for measuring) or .png (8 bits, for looking at)",
+                "{}: the name of a picture ends in .exr (linear, for measuring), .png (8 bits, for looking at) or .film (sums, to go \
+                 on with or to merge)",
                 path.display()
             ))),
         }
@@ -72,6 +76,7 @@ pub fn save(image: &Image, path: &Path, metadata: &Metadata, png: PngOptions) ->
             })?;
             Ok(SaveReport { png: Some(report) })
         }
+        Format::Film => Err(Error::usage(format!("{}: a film file holds sums, not a picture", path.display()))),
     }
 }
 

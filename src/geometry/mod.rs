@@ -2,6 +2,7 @@
 //! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area.
 
 mod area_table;
+mod doctor;
 mod mesh;
 mod morton;
 mod obj;
@@ -10,8 +11,9 @@ mod obj_mesh;
 mod shapes;
 
 pub use area_table::{AreaSample, AreaTable};
+pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;
-pub use obj::load_obj;
+pub use obj::{load_obj, write_obj};
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};

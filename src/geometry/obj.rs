@@ -1,7 +1,7 @@
 //! OBJ files through `tobj`: positions in f64, polygons cut into triangles, groups joined.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Write};
 use std::path::Path;
 
 use super::obj_lines::ObjLines;
@@ -27,6 +27,30 @@ pub fn load_obj(path: &Path) -> Result<ObjMesh> {
     }
     let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
     parse(&mut ObjLines::new(BufReader::with_capacity(1 << 16, file)), path)
+}
+
+/// Writes a mesh as OBJ, every digit of it.
+///
+/// # Errors
+/// What the system says.
+pub fn write_obj(mesh: &ObjMesh, out: &mut dyn Write) -> std::io::Result<()> {
+    for p in &mesh.positions {
+        writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
+    }
+    for n in mesh.normals.iter().flat_map(|n| &n.vectors) {
+        writeln!(out, "vn {:?} {:?} {:?}", n.x, n.y, n.z)?;
+    }
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = t.map(|v| v + 1);
+        match mesh.normals.as_ref().and_then(|n| n.triangles[i]) {
+            Some(n) => {
+                let [na, nb, nc] = n.map(|v| v + 1);
+                writeln!(out, "f {a}//{na} {b}//{nb} {c}//{nc}")?;
+            }
+            None => writeln!(out, "f {a} {b} {c}")?,
+        }
+    }
+    Ok(())
 }
 
 fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<ObjMesh> {

@@ -4,7 +4,9 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model, Partition};
-use crate::cache::{Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen};
+use crate::cache::{
+    CachedSample, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
+};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -191,7 +193,12 @@ impl Subsurface {
             if let Some(Plan { survey, near: Some(near) }) = plan {
                 let filler = self.filler(view, group[0].0, body, &survey.density);
                 for ((exit, &key), sum) in exits.iter().zip(&keys).zip(&mut found) {
-                    *sum += near.estimate(&filler, exit, hash_combine(key, 0x6e65_6172), &mut tally.rays);
+                    *sum += near.estimate(
+                        &filler,
+                        exit,
+                        hash_combine(key, 0x6e65_6172),
+                        (&mut tally.rays, &mut tally.gather),
+                    );
                 }
             }
             for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
@@ -258,7 +265,10 @@ impl Integrator for Subsurface {
             let body = body.as_ref()?;
             let filler = self.filler(view, object, body, &plans[object].survey.density);
             let count = self.options.cache_samples;
-            let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let mut cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let all = cache.lit.len();
+            cache.lit.retain(CachedSample::is_finite);
+            tally.gather.non_finite += (all - cache.lit.len()) as u64;
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
             let tuning = self.tuning(&plans[object], pass);

@@ -17,7 +17,7 @@ const TILE: u32 = 32;
 pub struct Job<'a> {
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Stop after this many passes; a pass is one sample of each pixel.
+    /// Stop before the pass of this number, counted from 0; a pass is one sample of each pixel.
     pub passes: Option<u32>,
     /// Stop after the pass that reaches this time of rendering.
     pub time: Option<Duration>,
@@ -26,7 +26,8 @@ pub struct Job<'a> {
 }
 
 /// Where the time went [s]; writing and measuring are not in it.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Seconds {
     /// Filling caches.
     pub cache: f64,
@@ -73,6 +74,25 @@ pub enum Stop {
     Cancelled,
 }
 
+/// Time and work of the passes of a film: what [`resume`] goes on from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Spent {
+    /// Time of all passes.
+    pub seconds: Seconds,
+    /// Work of all passes.
+    pub tally: Tally,
+}
+
+impl Spent {
+    /// Adds what another part of the render took.
+    pub fn add(&mut self, other: &Self) {
+        self.seconds.cache += other.seconds.cache;
+        self.seconds.gather += other.seconds.gather;
+        self.tally += other.tally;
+    }
+}
+
 /// What a finished render has to tell.
 #[derive(Debug)]
 pub struct Outcome {
@@ -96,11 +116,27 @@ pub fn run<I: Integrator>(
     film: &mut Film,
     observers: &mut [&mut dyn Observer],
 ) -> Result<Outcome> {
+    resume(integrator, view, job, film, Spent::default(), observers)
+}
+
+/// As [`run`] for a film with passes, which took `spent`: it goes on with the film's next pass.
+///
+/// # Errors
+/// As [`run`].
+pub fn resume<I: Integrator>(
+    integrator: &I,
+    view: View<'_>,
+    job: &Job<'_>,
+    film: &mut Film,
+    spent: Spent,
+    observers: &mut [&mut dyn Observer],
+) -> Result<Outcome> {
     let tiles = tiles(film.window());
-    let mut outcome = Outcome { stop: Stop::Passes, seconds: Seconds::default(), tally: Tally::default() };
+    let mut outcome = Outcome { stop: Stop::Passes, seconds: spent.seconds, tally: spent.tally };
     loop {
         outcome.stop = match job.passes {
-            Some(passes) if film.passes() >= passes => Stop::Passes,
+            Some(passes) if film.next_pass() >= passes => Stop::Passes,
+            _ if film.passes() >= Film::MOST_PASSES => Stop::Passes,
             _ if job.time.is_some_and(|limit| outcome.seconds.total() >= limit.as_secs_f64()) => Stop::Time,
             _ if job.cancel.load(Ordering::Relaxed) && film.passes() > 0 => Stop::Cancelled,
             _ => {
@@ -128,13 +164,14 @@ fn render_pass<I: Integrator>(
     tiles: &[Window],
     outcome: &mut Outcome,
 ) -> bool {
-    let (pass, mut tally, start) = (film.passes(), Tally::default(), Instant::now());
+    let (pass, mut tally, start) = (film.next_pass(), Tally::default(), Instant::now());
+    let first = film.passes() == 0;
     let shared = integrator.begin_pass(view, pass, &mut tally);
     let filled = Instant::now();
     let rendered: Vec<Option<(Vec<Rgb>, Tally)>> = tiles
         .par_iter()
         .map(|&tile| {
-            let dropped = pass > 0 && job.cancel.load(Ordering::Relaxed);
+            let dropped = !first && job.cancel.load(Ordering::Relaxed);
             (!dropped).then(|| render_tile(integrator, view, job, tile, pass, &shared))
         })
         .collect();
@@ -148,6 +185,24 @@ fn render_pass<I: Integrator>(
     outcome.tally += tally;
     film.end_pass();
     true
+}
+
+/// One sample of one pixel as a render of any window computes it, with the work of its whole pass: to look at what a
+/// count of odd samples names.
+pub fn replay<I: Integrator>(
+    integrator: &I,
+    view: View<'_>,
+    job: &Job<'_>,
+    pixel: [u32; 2],
+    pass: u32,
+) -> (Rgb, Tally) {
+    let mut tally = Tally::default();
+    let shared = integrator.begin_pass(view, pass, &mut tally);
+    let [x, y] = pixel;
+    let tile = Window { x0: x, y0: y, x1: x + 1, y1: y + 1 };
+    let (samples, work) = render_tile(integrator, view, job, tile, pass, &shared);
+    tally += work;
+    (samples[0], tally)
 }
 
 fn render_tile<I: Integrator>(

@@ -77,6 +77,28 @@ impl RecordFile {
         Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
     }
 
+    /// Goes on with the file at `path` for a render whose next pass is number `next`: lines of later passes, which are
+    /// lost and come again, are removed, and so is a last line that is cut short. Starts a new file where `next` is 0 or
+    /// there is none.
+    ///
+    /// # Errors
+    /// A file error with the path.
+    pub fn go_on(path: &Path, next: u32) -> Result<Self> {
+        if next == 0 || !path.exists() {
+            return Self::create(path);
+        }
+        let old = std::fs::read(path).map_err(|e| Error::file(path, "read records", e))?;
+        let kept = old.split_inclusive(|&b| b == b'\n').filter(|line| {
+            let record: Option<serde_json::Value> = serde_json::from_slice(line).ok();
+            let pass = record.and_then(|r| r.get("pass")?.as_u64());
+            pass.is_some_and(|pass| pass <= next.into()) && line.ends_with(b"\n")
+        });
+        let kept: Vec<u8> = kept.flatten().copied().collect();
+        crate::film::write_atomically(path, |out| out.write_all(&kept))?;
+        let file = File::options().append(true).open(path).map_err(|e| Error::file(path, "write records", e))?;
+        Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
+    }
+
     /// Appends a line.
     ///
     /// # Errors

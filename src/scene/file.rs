@@ -105,6 +105,22 @@ impl SceneFile {
         toml::to_string(&self.root.to_toml()).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
     }
 
+    /// [`Self::effective`] without what decides no bit of a sample: how many there are, and how they are shown.
+    pub fn decisive(&self) -> String {
+        let mut all = self.root.to_toml();
+        if let Some(render) = all.get_mut("render").and_then(toml::Value::as_table_mut) {
+            for key in ["spp", "exposure"] {
+                render.remove(key);
+            }
+            if render.is_empty()
+                && let Some(table) = all.as_table_mut()
+            {
+                table.remove("render");
+            }
+        }
+        toml::to_string(&all).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
+    }
+
     fn from_tree(root: Node, path: &Path) -> Result<Self> {
         let top = Fields::open(path, String::new(), &root)?;
         top.only("a scene", SECTIONS)?;

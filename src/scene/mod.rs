@@ -4,6 +4,7 @@
 //! `load.rs` (the way from one to the other).
 
 mod camera;
+mod doctor;
 mod file;
 mod load;
 mod materials;
@@ -14,6 +15,7 @@ mod warnings;
 mod world;
 
 pub use camera::Camera;
+pub use doctor::Remark;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};

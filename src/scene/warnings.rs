@@ -80,22 +80,12 @@ fn outside_diffusion(t: &Translucent) -> Option<String> {
 fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
     for (entry, object) in file.objects.iter().zip(&scene.objects) {
         let head = format!("{}: object {:?}", entry.at, entry.name);
-        let all = object.mesh.triangles.len();
-        let flat = (0..all as u32).filter(|&t| object.mesh.area(t) <= 0.0).count();
-        match &scene.materials[object.material].surface {
-            Surface::Emissive { .. } if flat == all => {
-                said.push(format!("{head}: all {all} triangles have no area: it sends out no light"));
-            }
-            surface => {
-                if flat > 0 {
-                    said.push(format!("{head}: {flat} of {all} triangles have no area; rays and samples pass them by"));
-                }
-                if let Surface::Translucent(t) = surface
-                    && let Some((lo, hi)) = object.mesh.bounds()
-                {
-                    said.extend(thin(t, (hi - lo).as_dvec3().length()).map(|what| format!("{head}: {what}")));
-                }
-            }
+        let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
+        said.extend(found.map(|what| format!("{head}: {what}")));
+        if let Surface::Translucent(t) = &scene.materials[object.material].surface
+            && let Some((lo, hi)) = object.mesh.bounds()
+        {
+            said.extend(thin(t, (hi - lo).as_dvec3().length()).map(|what| format!("{head}: {what}")));
         }
     }
 }
