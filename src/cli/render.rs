@@ -1,7 +1,7 @@
 //! `marmor render`: from a scene file to pictures. Reads in the order it runs.
 
 use super::INTERRUPTED;
-use super::observers::{ProgressDisplay, Records, Verbosity, error_figures};
+use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
 use marmor::film::{Attribute, Film, Image, Metadata, PngOptions, Window, check_writable, save, source_date_epoch};
@@ -35,6 +35,9 @@ pub struct Args {
     /// Stop after this time of rendering, such as 30s, 5m or 500ms
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<Duration>,
+    /// Stop when the estimated relMSE is down to this, such as 1e-3
+    #[arg(long, value_name = "E", value_parser = positive)]
+    target_error: Option<f64>,
     /// Threads [default: one for each core]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
@@ -97,7 +100,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let job = Job {
             seed: prepared.seed,
             passes: Some(args.spp.or(prepared.file.render.spp).unwrap_or(DEFAULT_SPP))
-                .filter(|_| args.spp.is_some() || args.time.is_none()),
+                .filter(|_| args.spp.is_some() || args.time.is_none() && args.target_error.is_none()),
             time: args.time,
             cancel: &cancel,
         };
@@ -108,6 +111,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             reference,
             description: rays.description(),
             effective: prepared.file.effective(),
+            own: OwnError::default(),
         };
         if verbosity > Verbosity::Quiet {
             let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles.len()).sum();
@@ -154,6 +158,7 @@ struct Task<'a> {
     reference: Option<Image>,
     description: String,
     effective: String,
+    own: OwnError,
 }
 
 impl Task<'_> {
@@ -165,14 +170,19 @@ impl Task<'_> {
             }
         }
         let seconds_setup = self.begin.elapsed().as_secs_f64();
-        let mut display = ProgressDisplay::new(self.verbosity);
+        let (target, each_pass) = (self.args.target_error, self.args.records.is_some());
+        let mut measure = Measure::new(self.own.clone(), each_pass, target);
+        let mut display = ProgressDisplay::new(self.verbosity, self.own.clone(), target);
         let mut records = match &self.args.records {
-            Some(path) => {
-                Some(Records { file: RecordFile::create(path)?, seconds_setup, reference: self.reference.clone() })
-            }
+            Some(path) => Some(Records {
+                file: RecordFile::create(path)?,
+                seconds_setup,
+                reference: self.reference.clone(),
+                own: self.own.clone(),
+            }),
             None => None,
         };
-        let mut observers: Vec<&mut dyn Observer> = vec![&mut display];
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut measure, &mut display];
         if let Some(records) = &mut records {
             observers.push(records);
         }
@@ -209,9 +219,15 @@ impl Task<'_> {
             match outcome.stop {
                 Stop::Passes => "",
                 Stop::Time => "; stopped by --time",
+                Stop::Satisfied => "; reached --target-error",
                 Stop::Cancelled => "; interrupted",
             }
         );
+        if let Some(own) = self.own.relmse() {
+            let interval =
+                own.interval.map_or(String::new(), |[low, high]| format!(" (95 %: {low:.2e} to {high:.2e})"));
+            eprintln!("estimated relMSE {:.2e}{interval}", own.value);
+        }
         if let Some(reference) = &self.reference {
             let e = error_figures(&film.image(), reference)?;
             let relative = e.relmse.map_or(String::new(), |value| format!(", relMSE {value:.4e}"));
@@ -293,6 +309,14 @@ fn duration(text: &str) -> std::result::Result<Duration, String> {
     match number.trim().parse::<f64>() {
         Ok(n) if n > 0.0 && n * factor < 1e9 => Ok(Duration::from_secs_f64(n * factor)),
         _ => Err("expected a time above 0 such as 30s, 5m or 500ms".into()),
+    }
+}
+
+/// A number above 0.
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(n) if n > 0.0 && n.is_finite() => Ok(n),
+        _ => Err("expected a number above 0 such as 1e-3".into()),
     }
 }
 

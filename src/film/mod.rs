@@ -10,6 +10,7 @@ mod memory;
 pub mod metrics;
 mod output;
 mod png_file;
+mod self_error;
 mod sums;
 mod window;
 
@@ -19,5 +20,6 @@ pub use exr_read::read_attributes;
 pub use image::Image;
 pub use output::{Format, PngOptions, SaveReport, check_writable, save};
 pub use png_file::PngReport;
+pub use self_error::{SelfError, SelfErrors};
 pub use sums::{BadSample, Counts, Film};
 pub use window::Window;

@@ -127,6 +127,11 @@ impl Film {
         self.passes
     }
 
+    /// Passes in the even and in the odd half.
+    pub fn half_passes(&self) -> [u32; 2] {
+        [self.passes.div_ceil(2), self.passes / 2]
+    }
+
     /// What was odd about the samples so far.
     pub fn counts(&self) -> Counts {
         self.counts

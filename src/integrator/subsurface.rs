@@ -11,7 +11,7 @@ use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
-use crate::sampling::{CacheStream, PixelStream, Points};
+use crate::sampling::{CacheStream, PixelStream, Points, Turn};
 use crate::scene::{EntrySampling, Estimator, Scene, Surface};
 
 /// Options of [`Subsurface`].
@@ -51,7 +51,8 @@ struct Body {
     model: Model,
     envelope: Envelope,
     table: AreaTable,
-    stream: CacheStream,
+    /// Of even passes and of odd ones.
+    streams: [CacheStream; Turn::STREAMS],
 }
 
 impl Subsurface {
@@ -63,10 +64,10 @@ impl Subsurface {
         let body = |(index, object): (usize, &crate::scene::Object)| {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
-            let stream = CacheStream::new(options.points, options.seed, index as u64);
+            let stream = |seed| CacheStream::new(options.points, seed, index as u64);
             let model = t.build()?;
             let envelope = Envelope::new(&model, &t.medium);
-            Ok(Some(Body { medium: t.medium, model, envelope, table, stream }))
+            Ok(Some(Body { medium: t.medium, model, envelope, table, streams: Turn::seeds(options.seed).map(stream) }))
         };
         Ok(Self {
             options,
@@ -159,6 +160,7 @@ impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        let turn = Turn::of(self.options.seed, pass);
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
             let filler = Filler {
@@ -170,10 +172,10 @@ impl Integrator for Subsurface {
                 model: &body.model,
                 eta: body.medium.eta,
                 sampling: self.options.entry,
-                stream: &body.stream,
+                stream: &body.streams[turn.stream],
             };
             let count = self.options.cache_samples;
-            let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let cache = filler.fill(u64::from(turn.number) * u64::from(count), count, &mut tally.rays);
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
             Some(Gatherer::new(self.options.estimator, cache, &body.model, self.options.cut_error))

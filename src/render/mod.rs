@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::{Film, Window};
 use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
-use crate::sampling::PixelStream;
+use crate::sampling::{PixelStream, Turn};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -60,6 +60,11 @@ pub trait Observer {
     /// # Errors
     /// Whatever the observer cannot do, such as writing a record.
     fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()>;
+
+    /// True once the render is as good as this observer wants it; asked after each pass.
+    fn satisfied(&self) -> bool {
+        false
+    }
 }
 
 /// Why a render ended.
@@ -69,6 +74,8 @@ pub enum Stop {
     Passes,
     /// Time is up.
     Time,
+    /// An observer is satisfied, such as one that waits for an error to be reached.
+    Satisfied,
     /// Somebody set [`Job::cancel`].
     Cancelled,
 }
@@ -102,6 +109,7 @@ pub fn run<I: Integrator>(
         outcome.stop = match job.passes {
             Some(passes) if film.passes() >= passes => Stop::Passes,
             _ if job.time.is_some_and(|limit| outcome.seconds.total() >= limit.as_secs_f64()) => Stop::Time,
+            _ if observers.iter().any(|o| o.satisfied()) => Stop::Satisfied,
             _ if job.cancel.load(Ordering::Relaxed) && film.passes() > 0 => Stop::Cancelled,
             _ => {
                 if !render_pass(integrator, view, job, film, &tiles, &mut outcome) {
@@ -160,11 +168,12 @@ fn render_tile<I: Integrator>(
 ) -> (Vec<Rgb>, Tally) {
     let camera = &view.scene.camera;
     let width = u64::from(camera.resolution[0]);
+    let turn = Turn::of(job.seed, pass);
     let whole = if integrator.shares_tiles() { whole_tile(tile, camera.resolution) } else { tile };
     let mut rays = Vec::with_capacity(whole.area());
     for y in whole.y0..whole.y1 {
         for x in whole.x0..whole.x1 {
-            let mut stream = PixelStream::new(job.seed, u64::from(y) * width + u64::from(x), pass);
+            let mut stream = PixelStream::new(turn.seed, u64::from(y) * width + u64::from(x), turn.number);
             let ray = camera.ray([x, y], stream.next_2d());
             rays.push(CameraRay { ray, stream });
         }
