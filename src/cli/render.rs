@@ -4,7 +4,10 @@ use super::INTERRUPTED;
 use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
-use marmor::film::{Attribute, Film, Image, Metadata, PngOptions, Window, check_writable, save, source_date_epoch};
+use marmor::film::{
+    Attribute, Film, Image, Layer, Metadata, PngOptions, Window, check_writable, save_with_layers, source_date_epoch,
+    variance,
+};
 use marmor::integrator::{Integrator, View};
 use marmor::query;
 use marmor::render::{self, Job, Observer, Outcome, Stop};
@@ -44,6 +47,9 @@ pub struct Args {
     /// Render these pixels only: x0,y0,x1,y1, the last two exclusive
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = window)]
     crop: Option<Window>,
+    /// Further layers in the EXR, separated by commas: variance
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    layers: Vec<LayerName>,
     /// Brighten or darken the PNG by this many stops [default: the scene's, else 0]
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
     exposure: Option<f64>,
@@ -142,8 +148,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
         };
         let exposure = args.exposure.or(prepared.file.render.exposure).unwrap_or(0.0);
         let image = film.image();
+        let layers = layers(&args.layers, &film)?;
         for path in &outputs {
-            save(&image, path, &metadata, PngOptions { exposure })?;
+            save_with_layers(&image, &layers, path, &metadata, PngOptions { exposure })?;
         }
         task.tell(&finished, &film, &outputs)?;
         Ok(if finished.stop == Stop::Cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
@@ -271,6 +278,22 @@ fn attributes(prepared: &super::setup::Prepared, film: &Film, backend: &str) -> 
     ];
     list.extend(prepared.method_attributes().into_iter().map(|(key, value)| text(key, value)));
     list
+}
+
+/// What an EXR may hold beside the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum LayerName {
+    /// Variance of each pixel's mean
+    Variance,
+}
+
+/// The layers asked for, each once.
+fn layers(names: &[LayerName], film: &Film) -> Result<Vec<Layer>> {
+    if !names.contains(&LayerName::Variance) {
+        return Ok(Vec::new());
+    }
+    let image = variance(film).ok_or_else(|| Error::usage("--layers variance needs at least 2 samples per pixel"))?;
+    Ok(vec![Layer { name: "Variance".into(), image }])
 }
 
 /// NAME.exr and NAME.png in the current folder; NAME is the scene file's, or its folder's for a plain `scene.toml`.
