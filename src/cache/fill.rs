@@ -110,7 +110,7 @@ impl Filler<'_> {
     }
 
     /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
-    /// and some by the cosine, each counts over the density of both [Veach 1997, balance heuristic].
+    /// and some by the cosine, each counts over the density of both [Vea97], the balance heuristic.
     fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut RayTally) -> Option<(Arrival, bool)> {
         let share = self.cosine_share;
         if !self.lights.has_emitters() {
