@@ -15,7 +15,7 @@ mod sums;
 mod window;
 
 pub use atomic::write_atomically;
-pub use checkpoint::{Checkpoint, Identity};
+pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::Image;
