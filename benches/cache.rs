@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use marmor::bssrdf::{Exit, Model, ModelName};
-use marmor::cache::{Cache, Density, Envelope, Filler, GatherTally, Gatherer, Scratch};
+use marmor::cache::{Cache, Density, Envelope, Filler, GatherTally, Gatherer, Scratch, Tuning};
 use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
 use marmor::math::{Rgb, hash};
@@ -107,6 +107,7 @@ impl Bench<'_> {
             table: self.table,
             eta: 1.3,
             sampling: EntrySampling::Light,
+            cosine_share: 0.0,
             stream: &stream,
             density: &Density::even(),
         };
@@ -166,12 +167,12 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         tally: GatherTally::default(),
     };
     for error in [0.003, 0.01, 0.03, 0.1] {
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, error);
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(error));
         entrants.push(entrant(format!("cut {error}"), gatherer));
     }
     let built = start.elapsed().as_secs_f64() / 4.0;
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &model, 0.0);
+        let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(0.1));
         entrants.push(entrant(estimator.name().to_string(), gatherer));
     }
     let tiles = bench.tiles();
@@ -289,7 +290,7 @@ fn timed(bench: &Bench<'_>) {
     let mut tally = GatherTally::default();
     group.throughput(Throughput::Elements(cache.lit.len() as u64));
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &model, 0.0);
+        let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(0.1));
         let mut key = 0;
         group.bench_function(format!("{}, pairs", estimator.name()), |b| {
             b.iter(|| {

@@ -256,7 +256,7 @@ fn scene() {
         let options = SubsurfaceOptions {
             cache_samples: 100,
             estimator: Estimator::Cut,
-            cut_error: 0.1,
+            cut_error: Some(0.1),
             entry: EntrySampling::Light,
             points: Points::Sobol,
             spread: Spread::Seen,

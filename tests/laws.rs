@@ -138,7 +138,7 @@ fn options(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
     SubsurfaceOptions {
         cache_samples,
         estimator,
-        cut_error: 0.1,
+        cut_error: Some(0.1),
         entry: EntrySampling::Light,
         points: Points::Sobol,
         spread: Spread::Seen,
@@ -185,7 +185,13 @@ fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -
     all.push(("direct".into(), film(&Direct::new(scene, 2).unwrap(), scene, backend, passes.clone()).0));
     for model in ModelName::ALL {
         set_model(scene, model);
-        for (estimator, samples) in [(Estimator::Cut, 1500), (Estimator::All, 100), (Estimator::Notes, 100)] {
+        for (estimator, samples) in [
+            (Estimator::Cut, 1500),
+            (Estimator::All, 100),
+            (Estimator::Notes, 100),
+            (Estimator::Thinned, 1500),
+            (Estimator::Cluster, 1500),
+        ] {
             let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
             let name = format!("{}, {}", model.name(), estimator.name());
             all.push((name, film(&method, scene, backend, passes.clone()).0));

@@ -192,7 +192,7 @@ fn subsurface(seed: u64) -> SubsurfaceOptions {
     SubsurfaceOptions {
         cache_samples: 4096,
         estimator: Estimator::Notes,
-        cut_error: 0.03,
+        cut_error: Some(0.03),
         spread: Spread::Seen,
         entry: EntrySampling::Light,
         points: Points::Sobol,

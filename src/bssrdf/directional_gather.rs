@@ -43,11 +43,14 @@ impl Kernel for Sum<'_> {
                 .map(|(column, at)| block(column, start, count, at as f32 + 1.0));
             let n = d.n.map(|column| block(column, start, count, 1.0));
             let w = d.w.map(|column| block(column, start, count, -1.0));
-            let weight = e.weight.map(|column| block(column, start, count, 0.0));
+            let mut weight = e.weight.map(|column| block(column, start, count, 0.0));
             let mut pairs = [[0.0_f64; BLOCK]; 7];
             for i in 0..BLOCK {
                 let vector = |v: &[[f32; BLOCK]; 3]| DVec3::new(v[0][i].into(), v[1][i].into(), v[2][i].into());
-                let pair = Pair::new(self.at - vector(&x), vector(&n), vector(&w), self.n_o).columns();
+                let apart = self.at - vector(&x);
+                let far = e.partition.far(apart.length_squared() as f32);
+                weight.iter_mut().for_each(|w| w[i] *= far);
+                let pair = Pair::new(apart, vector(&n), vector(&w), self.n_o).columns();
                 for (column, value) in pairs.iter_mut().zip(pair) {
                     column[i] = value;
                 }
@@ -116,7 +119,7 @@ impl DirectionalDipole {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bssrdf, Entry, Exit};
+    use super::super::{Bssrdf, Entry, Exit, Partition};
     use super::*;
     use crate::math::{Rgb, hash, unit_f32};
     use crate::optics::Medium;
@@ -150,7 +153,7 @@ mod tests {
                     }
                 }
                 let [x, y, z, n0, n1, n2, w0, w1, w2, r, g, b] = columns.each_ref().map(Vec::as_slice);
-                let entries = EntryColumns { x, y, z, weight: [r, g, b] };
+                let entries = EntryColumns { x, y, z, weight: [r, g, b], partition: Partition::NONE };
                 let directions = DirectionColumns { n: [n0, n1, n2], w: [w0, w1, w2] };
                 let (sum, clamps) = model.gather_at(Level::Baseline, at, n_o, entries, directions);
                 assert_eq!(clamps, clamped_ones);

@@ -13,6 +13,7 @@ mod directional_gather;
 mod exponential;
 mod multipole;
 mod normalised;
+mod partition;
 mod radial;
 mod single;
 mod slab;
@@ -30,6 +31,7 @@ pub use depth::DepthLaw;
 pub use directional::{DirectionalChannel, DirectionalDipole};
 pub use directional_gather::DirectionColumns;
 pub use normalised::{NormalisedDiffusion, WidthFit};
+pub use partition::Partition;
 pub use radial::{EntryColumns, Gather, Radial};
 pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
 pub use slab::Slab;
@@ -292,6 +294,15 @@ impl Model {
         match self {
             Self::Beam(model) => model.sample_depth(u),
             _ => 0.0,
+        }
+    }
+
+    /// What decides how far an entry is from an exit [unit²], see [`Partition`]: the distance between them, or for models
+    /// with interior sources the way along the refracted ray and from its end to the exit.
+    pub fn apart2(&self, entry: &Entry, depth: f32, exit: &Exit) -> f32 {
+        match self {
+            Self::Beam(_) => ((entry.x + entry.w * depth).distance(exit.x) + depth).powi(2),
+            _ => entry.x.distance_squared(exit.x),
         }
     }
 

@@ -1,7 +1,7 @@
 //! The sum over a tree of samples, in which one random member stands for each far node.
 
 use super::{Columns, Envelope, Node, Tree};
-use crate::bssrdf::{Exit, Model};
+use crate::bssrdf::{Exit, Model, Partition};
 use crate::math::{Vec3, Vec4, hash};
 
 /// A node whose members spread over less than this share of its distance counts as a point when the sum is guessed.
@@ -10,13 +10,16 @@ const GUESS: f32 = 0.3;
 /// Exits of one group at most.
 const GROUP: usize = 32;
 /// A group whose cut is longer than this is halved: its exits are too far apart to have one cut.
-const LONG: usize = 1024;
+const LONG: usize = 4096;
+/// A channel below this share of the brightest is held to the accuracy of one of this size.
+const DARK_CHANNEL: f32 = 0.02;
 /// Exits at which the sum of a group is guessed, at most.
 const GUESSES: usize = 4;
 
 /// Working space of [`cut`], for one model.
 pub struct Buffer {
     columns: Columns,
+    clusters: Columns,
     /// Samples to evaluate, and factors on their weights.
     picked: Vec<(u32, f32)>,
     /// Nodes for which one member stands.
@@ -28,7 +31,13 @@ pub struct Buffer {
 impl Buffer {
     /// Empty.
     pub fn new(model: &Model) -> Self {
-        Self { columns: Columns::new(model), picked: Vec::new(), far: Vec::new(), order: Vec::new() }
+        Self {
+            columns: Columns::new(model),
+            clusters: Columns::new(model),
+            picked: Vec::new(),
+            far: Vec::new(),
+            order: Vec::new(),
+        }
     }
 }
 
@@ -48,12 +57,18 @@ pub struct CutWork {
 pub struct Cut<'a> {
     /// The samples.
     pub tree: &'a Tree,
+    /// Where given, the mean of its members stands for a far node in place of a random one [JB02]: biased.
+    pub clusters: Option<&'a Columns>,
     /// Their S_d.
     pub model: &'a Model,
     /// How fast it falls.
     pub envelope: &'a Envelope,
     /// The largest share of the whole sum that the standard deviation of one node may have.
     pub error: f32,
+    /// Sums below this are held to the accuracy of one of this size; the fourth is 0.
+    pub floor: Vec4,
+    /// The part of S_d that is summed is the far one.
+    pub partition: Partition,
 }
 
 /// Exits that share one cut: a ball around them.
@@ -120,6 +135,8 @@ impl Cut<'_> {
         for &i in order.iter().step_by(step) {
             least = least.min(self.guess(exits[i as usize].x, work));
         }
+        // A channel that is dark beside the others, or where the whole surface is brighter, need not be finer than they are.
+        least = least.max(Vec4::splat(DARK_CHANNEL * least.max_element())).max(self.floor);
         // Channels without light must not open anything.
         let limit = Vec4::from_array(least.to_array().map(|g| if g > 0.0 { 1.0 / (self.error * g) } else { 0.0 }));
         buffer.picked.clear();
@@ -150,14 +167,25 @@ impl Cut<'_> {
         out: &mut [[f64; 3]],
         work: &mut CutWork,
     ) {
-        // One after the other, so that their visits to memory overlap.
-        for &at in &buffer.far {
-            buffer.picked.extend(self.tree.draw(&self.tree.nodes[at as usize], uniform(key, at as usize)));
+        work.evaluated += (buffer.picked.len() + buffer.far.len()) as u64 * order.len() as u64;
+        if let Some(clusters) = self.clusters {
+            let far: Vec<(u32, f32)> = buffer.far.iter().map(|&at| (at, 1.0)).collect();
+            buffer.clusters.pick(clusters, &far);
+        } else {
+            // One after the other, so that their visits to memory overlap.
+            for &at in &buffer.far {
+                buffer.picked.extend(self.tree.draw(&self.tree.nodes[at as usize], uniform(key, at as usize)));
+            }
         }
-        work.evaluated += buffer.picked.len() as u64 * order.len() as u64;
         buffer.columns.pick(&self.tree.columns, &buffer.picked);
         for &i in order {
-            out[i as usize] = buffer.columns.sum(self.model, &exits[i as usize], &mut work.clamped);
+            let exit = &exits[i as usize];
+            let mut sum = buffer.columns.sum(self.model, exit, self.partition, &mut work.clamped);
+            if self.clusters.is_some() {
+                let far = buffer.clusters.sum(self.model, exit, self.partition, &mut work.clamped);
+                sum.iter_mut().zip(far).for_each(|(sum, far)| *sum += far);
+            }
+            out[i as usize] = sum;
         }
     }
 

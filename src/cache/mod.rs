@@ -7,18 +7,22 @@ mod density;
 mod envelope;
 mod estimate;
 mod fill;
+mod near;
 mod notes;
+mod thinned;
 mod tree;
 
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
 pub use columns::Columns;
 pub use cut::{Buffer, Cut, CutWork};
-pub use density::{Density, Seen, seen};
+pub use density::{Density, Seen, Survey, seen};
 pub use envelope::{Envelope, Fall};
-pub use estimate::{Gatherer, PLAIN_SUM, Scratch};
+pub use estimate::{Gatherer, PLAIN_SUM, Scratch, Tuning};
 pub use fill::Filler;
+pub use near::NearField;
 pub use notes::notes;
+pub use thinned::{Thinning, thinned};
 pub use tree::{Node, Tree};
 
 /// The cached samples of one object and one pass. Samples that met no light are not stored, but count.

@@ -4,9 +4,7 @@ use marmor::bssrdf::ModelName;
 use marmor::integrator::{AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions};
 use marmor::query::Backend;
 use marmor::sampling::Points;
-use marmor::scene::{
-    DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Spread, Surface,
-};
+use marmor::scene::{EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Spread, Surface};
 use marmor::{Error, Result};
 use std::path::Path;
 
@@ -183,7 +181,7 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
             let options = SubsurfaceOptions {
                 cache_samples: options.cache_samples.unwrap_or(estimator.default_samples()),
                 estimator,
-                cut_error: options.cut_error.map_or(DEFAULT_CUT_ERROR, |e| e as f32),
+                cut_error: options.cut_error.map(|e| e as f32),
                 entry,
                 points,
                 spread: if as_notes { Spread::Area } else { options.spread.unwrap_or(Spread::Seen) },

@@ -3,12 +3,14 @@
 use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::bssrdf::{Exit, Model};
-use crate::cache::{CachedSample, Density, Envelope, Filler, Gatherer, PLAIN_SUM, Scratch, Seen, seen};
+use crate::bssrdf::{Exit, Model, Partition};
+use crate::cache::{
+    CachedSample, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
+};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, hash_combine};
 use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
@@ -26,8 +28,8 @@ pub struct SubsurfaceOptions {
     pub cache_samples: u32,
     /// How the sum over the cache is estimated.
     pub estimator: Estimator,
-    /// The largest share of the sum that one node of a `cut` may be wrong by.
-    pub cut_error: f32,
+    /// The largest share of the sum that one node of a `cut` may be wrong by; by the noise of the cache if absent.
+    pub cut_error: Option<f32>,
     /// How directions of entering light are picked.
     pub entry: EntrySampling,
     /// What numbers pick the points on the surface.
@@ -50,8 +52,28 @@ pub struct Subsurface {
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
     bodies: Vec<Option<Body>>,
-    /// Where each body's samples are spent; known with the first pass.
-    densities: OnceLock<Vec<Density>>,
+    /// What is known of each body with the first pass.
+    plans: OnceLock<Vec<Plan>>,
+}
+
+/// Fewer cached samples than this in the area whose light matters to an exit, and the near field is sampled for each exit.
+const NEAR_SAMPLES: f64 = 8.0;
+/// Radius of the near field in distances between cached samples.
+const NEAR_RADIUS: f32 = 3.0;
+/// Sums below this share of what is typical for the object are held to the accuracy of one of this size.
+const DARK: f32 = 0.1;
+/// A cut whose nodes may be wrong by a share e adds a relative variance of about 0.001 e: with this factor a third of the
+/// cache's.
+const CUT_SHARE: f64 = 300.0;
+/// The finest cut.
+const FINEST: f64 = 0.01;
+/// The coarsest cut.
+const COARSEST: f64 = 0.2;
+
+/// How a body's light is gathered.
+struct Plan {
+    survey: Survey,
+    near: Option<NearField>,
 }
 
 /// A translucent object.
@@ -61,6 +83,7 @@ struct Body {
     envelope: Envelope,
     table: AreaTable,
     stream: CacheStream,
+    cosine_share: f32,
 }
 
 impl Subsurface {
@@ -75,20 +98,23 @@ impl Subsurface {
         let what = format!("the cache of {samples} samples a pass");
         let needed = u128::from(samples) * BYTES_PER_SAMPLE;
         memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
+        let lights = Lights::new(scene);
         let body = |(index, object): (usize, &crate::scene::Object)| {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
             let stream = CacheStream::new(options.points, options.seed, index as u64);
             let model = t.build()?;
             let envelope = Envelope::new(&model, &t.medium);
-            Ok(Some(Body { medium: t.medium, model, envelope, table, stream }))
+            let cosine_share = object.mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds));
+            Ok(Some(Body { medium: t.medium, model, envelope, table, stream, cosine_share }))
         };
+        let bodies = scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?;
         Ok(Self {
             options,
-            light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
+            light: DirectLight { lights, samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
-            bodies: scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?,
-            densities: OnceLock::new(),
+            bodies,
+            plans: OnceLock::new(),
         })
     }
 
@@ -103,25 +129,50 @@ impl Subsurface {
             model: &body.model,
             eta: body.medium.eta,
             sampling: self.options.entry,
+            cosine_share: body.cosine_share,
             stream: &body.stream,
             density,
         }
     }
 
-    /// Where each body's samples are spent. A function of scene and seed: the same for any pass that asks first.
-    fn densities(&self, view: View<'_>) -> Vec<Density> {
+    /// What is known of each body before its first pass. A function of scene and seed: the same for any pass that asks first.
+    fn plans(&self, view: View<'_>) -> Vec<Plan> {
         // With directions by the cosine most trials would miss the lights.
-        if self.options.spread == Spread::Area || self.options.entry == EntrySampling::Cosine {
-            return self.bodies.iter().map(|_| Density::even()).collect();
-        }
+        let blind = self.options.entry == EntrySampling::Cosine || self.options.estimator == Estimator::Notes;
+        let mut points = if blind { Vec::new() } else { seen(view.scene, view.rays) };
+        points.resize(self.bodies.len(), Vec::new());
         let even = Density::even();
-        let density = |(object, (body, seen)): (usize, (&Option<Body>, Vec<Seen>))| {
-            let Some(body) = body else { return Density::even() };
+        let plan = |(object, (body, seen)): (usize, (&Option<Body>, Vec<Seen>))| {
+            let Some(body) = body.as_ref().filter(|_| !seen.is_empty()) else {
+                return Plan { survey: Survey::none(), near: None };
+            };
             let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
             let filler = Filler { stream: &stream, ..self.filler(view, object, body, &even) };
-            Density::seen(&filler, &body.envelope, &seen)
+            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread);
+            Plan { survey, near: self.near(body) }
         };
-        self.bodies.iter().zip(seen(view.scene, view.rays)).enumerate().map(density).collect()
+        self.bodies.iter().zip(points).enumerate().map(plan).collect()
+    }
+
+    /// The near field of media whose light does not come as far as the next sample of the cache.
+    fn near(&self, body: &Body) -> Option<NearField> {
+        let split = matches!(self.options.estimator, Estimator::All | Estimator::Cut | Estimator::Cluster);
+        let apart2 = body.table.area() / f64::from(self.options.cache_samples);
+        let sparse = body.envelope.effective_area() < NEAR_SAMPLES * apart2;
+        (split && sparse).then(|| NearField::new(&body.envelope, NEAR_RADIUS * apart2.sqrt() as f32))
+    }
+
+    /// How fine the sums of pass number `pass` are.
+    fn tuning(&self, plan: &Plan, pass: u32) -> Tuning {
+        let passes = f64::from(pass) + 1.0;
+        let noise2 = plan.survey.noise2(passes * f64::from(self.options.cache_samples));
+        // Draws of a cut are new in each pass, and average as its number; the cache's stream goes on and averages faster.
+        let error = self.options.cut_error.unwrap_or((CUT_SHARE * passes * noise2).clamp(FINEST, COARSEST) as f32);
+        Tuning {
+            error,
+            floor: DARK * plan.survey.typical,
+            partition: plan.near.as_ref().map_or(Partition::NONE, |near| near.partition),
+        }
     }
 
     /// What leaves through the surface at each translucent hit; exits of one object are gathered together.
@@ -148,6 +199,13 @@ impl Subsurface {
             let exits: Vec<Exit> = group.iter().filter_map(exit).collect();
             let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
             gatherer.gather((&body.model, &body.envelope), &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
+            let plan = self.plans.get().map(|plans| &plans[group[0].0]);
+            if let Some(Plan { survey, near: Some(near) }) = plan {
+                let filler = self.filler(view, group[0].0, body, &survey.density);
+                for ((exit, &key), sum) in exits.iter().zip(&keys).zip(&mut found) {
+                    *sum += near.estimate(&filler, exit, hash_combine(key, 0x6e65_6172), &mut tally.rays);
+                }
+            }
             for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
                 inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));
             }
@@ -207,10 +265,10 @@ impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
-        let densities = self.densities.get_or_init(|| self.densities(view));
+        let plans = self.plans.get_or_init(|| self.plans(view));
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
-            let filler = self.filler(view, object, body, &densities[object]);
+            let filler = self.filler(view, object, body, &plans[object].survey.density);
             let count = self.options.cache_samples;
             let mut cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
             let all = cache.lit.len();
@@ -218,7 +276,8 @@ impl Integrator for Subsurface {
             tally.gather.non_finite += (all - cache.lit.len()) as u64;
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
-            Some(Gatherer::new(self.options.estimator, cache, &body.model, self.options.cut_error))
+            let tuning = self.tuning(&plans[object], pass);
+            Some(Gatherer::new(self.options.estimator, cache, &body.model, tuning))
         };
         self.bodies.iter().enumerate().map(fill).collect()
     }
@@ -235,7 +294,7 @@ impl Integrator for Subsurface {
     }
 
     fn shares_tiles(&self) -> bool {
-        self.options.estimator == Estimator::Cut
+        matches!(self.options.estimator, Estimator::Cut | Estimator::Cluster)
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {

@@ -55,10 +55,14 @@ named! {
     Estimator, "estimator",
     /// The plain loop over all samples with rejection control.
     Notes = "notes",
+    /// Rejection control as in `notes`, its decisions taken on a tree.
+    Thinned = "thinned",
     /// The vectorised sum over all samples.
     All = "all",
     /// One random member stands for each far node of a tree.
-    Cut = "cut"
+    Cut = "cut",
+    /// The mean of its members stands for each far node of the same tree: biased, for comparison.
+    Cluster = "cluster"
 }
 
 impl Estimator {
@@ -68,13 +72,11 @@ impl Estimator {
         match self {
             Self::Notes => 1024,
             Self::All => 4096,
-            Self::Cut => 32768,
+            Self::Thinned => 16384,
+            Self::Cut | Self::Cluster => 131_072,
         }
     }
 }
-
-/// [`MethodOptions::cut_error`] unless the scene says.
-pub const DEFAULT_CUT_ERROR: f32 = 0.3;
 
 named! {
     /// How the light arriving at a cached sample is found.

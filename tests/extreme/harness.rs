@@ -118,7 +118,7 @@ pub fn subsurface(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions
     SubsurfaceOptions {
         cache_samples,
         estimator,
-        cut_error: 0.1,
+        cut_error: Some(0.1),
         entry: EntrySampling::Light,
         points: Points::Sobol,
         spread: Spread::Seen,
@@ -152,7 +152,9 @@ pub fn shots(scene: &Scene) -> Vec<Shot> {
         all.push(shot(&occlusion, scene, backend, "ambient_occlusion".into()));
         all.push(shot(&Direct::new(scene, 1).unwrap(), scene, backend, "direct".into()));
         // 2000 is above what is summed without a tree.
-        for (estimator, samples) in [(Estimator::Cut, 2000), (Estimator::All, 200), (Estimator::Notes, 200)] {
+        for (estimator, samples) in
+            [(Estimator::Cut, 2000), (Estimator::All, 200), (Estimator::Notes, 200), (Estimator::Thinned, 2000)]
+        {
             all.push(subsurface_shot(scene, estimator, samples, backend));
         }
     }
