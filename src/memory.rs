@@ -5,11 +5,22 @@ use std::fs::read_to_string;
 use std::path::Path;
 
 /// Memory that this process can still get [bytes], where the system tells (Linux): what is free or can be freed, and no
-/// more than its control groups (versions 2 and 1: containers, batch systems) leave it.
+/// more than its control groups (versions 2 and 1: containers, batch systems) and its own limit (`ulimit -v`) leave it.
 pub fn available() -> Option<u64> {
     let free = read_to_string("/proc/meminfo").ok().as_deref().and_then(parse_available);
     let groups = read_to_string("/proc/self/cgroup").unwrap_or_default();
-    free.into_iter().chain(left_by_groups(&groups, Path::new("/sys/fs/cgroup"))).min()
+    let limits = read_to_string("/proc/self/limits").unwrap_or_default();
+    let status = read_to_string("/proc/self/status").unwrap_or_default();
+    let own = left_by_limit(&limits, &status);
+    free.into_iter().chain(left_by_groups(&groups, Path::new("/sys/fs/cgroup"))).chain(own).min()
+}
+
+/// What the limit on addresses leaves; `None` without one.
+fn left_by_limit(limits: &str, status: &str) -> Option<u64> {
+    let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let limit = line.split_whitespace().next()?.parse::<u64>().ok()?;
+    let used = status.lines().find_map(|line| line.strip_prefix("VmSize:"))?.trim().strip_suffix("kB")?.trim();
+    Some(limit.saturating_sub(used.parse::<u64>().ok()? * 1024))
 }
 
 fn parse_available(meminfo: &str) -> Option<u64> {
@@ -111,6 +122,13 @@ mod tests {
         let text = "MemTotal:       100 kB\nMemAvailable:   12345 kB\n";
         assert_eq!(parse_available(text), Some(12345 * 1024));
         assert_eq!(parse_available("nothing of the kind"), None);
+    }
+
+    #[test]
+    fn a_limit_on_addresses_counts_what_is_used() {
+        let limits = "Limit  Soft Limit  Hard Limit  Units\nMax address space         2048000  unlimited  bytes\n";
+        assert_eq!(left_by_limit(limits, "VmPeak: 9 kB\nVmSize:\t    1000 kB\n"), Some(1_024_000));
+        assert_eq!(left_by_limit(&limits.replace("2048000", "unlimited"), "VmSize: 1000 kB"), None);
     }
 
     /// Folders as the kernel has them; a group may not leave more than the one above it.

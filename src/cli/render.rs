@@ -20,6 +20,9 @@ use std::time::{Duration, Instant};
 /// Samples per pixel where neither scene nor options say.
 const DEFAULT_SPP: u32 = 64;
 
+/// More threads than any machine has processors.
+const MOST_THREADS: usize = 4096;
+
 #[derive(clap::Args)]
 pub struct Args {
     /// The scene file
@@ -99,6 +102,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let reference = args.reference.as_deref().map(Image::read_exr).transpose()?;
     let mut builder = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
+        if threads > MOST_THREADS {
+            return Err(Error::usage(format!("--threads {threads}: at most {MOST_THREADS}")));
+        }
         builder = builder.num_threads(threads.max(1));
     }
     let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;

@@ -265,6 +265,13 @@ impl Checksum {
     }
 }
 
+/// The number that ends a film file with these bytes before it: for tests of what reads the rest.
+pub fn checksum(bytes: &[u8]) -> u64 {
+    let mut sum = Checksum::default();
+    sum.update(bytes);
+    sum.value()
+}
+
 /// Reads or writes and sums up what goes by.
 struct Summing<T> {
     inner: T,

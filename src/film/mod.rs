@@ -17,7 +17,7 @@ mod variance;
 mod window;
 
 pub use atomic::write_atomically;
-pub use checkpoint::{Checkpoint, Identity};
+pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::Image;

@@ -14,6 +14,6 @@ pub use area_table::{AreaSample, AreaTable};
 pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;
-pub use obj::{load_obj, write_obj};
+pub use obj::{LOADING_BYTES, load_obj, write_obj};
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};

@@ -9,6 +9,9 @@ use super::{ObjMesh, ObjNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 
+/// Memory while a mesh is read and looked at [bytes/triangle], at its most.
+pub const LOADING_BYTES: usize = 320;
+
 /// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
 /// left out. A polygon becomes the fan of triangles about its first corner, which is right for convex polygons and
 /// covers too much for concave ones: triangulate those in the modelling program. Texture coordinates, vertex colours,
@@ -18,7 +21,7 @@ use crate::math::DVec3;
 /// # Errors
 /// A file error if `path` cannot be read. A scene error that names path and line if a vertex is not finite or not a
 /// number, an index is 0 or of a vertex that does not exist, or a line is longer than 1 MiB; one that names the path
-/// if there are no faces.
+/// if there are no faces. A Memory error, found while reading, if the mesh is more than what is available.
 pub fn load_obj(path: &Path) -> Result<ObjMesh> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
     if !metadata.is_file() {
@@ -59,6 +62,9 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
     // What the reader of lines found first; tobj's own complaints carry no line.
     if let Some(cause) = lines.failed_read() {
         return Err(Error::file(path, "read", cause));
+    }
+    if let Some(error) = lines.out_of_memory() {
+        return Err(error.within(path.display()));
     }
     let at = |line: usize, what: &str| Error::scene(format!("{}:{line}: {what}", path.display()));
     if let Some((line, what)) = lines.complaint() {

@@ -11,11 +11,15 @@ use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3, hash_combine};
+use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{CacheStream, PixelStream, Points, Turn};
 use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface};
 use std::sync::OnceLock;
+
+/// A cached sample, its columns twice while the tree is built, and its share of the tree.
+const BYTES_PER_SAMPLE: u128 = 256;
 
 /// Options of [`Subsurface`].
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +93,12 @@ impl Subsurface {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Result<Self> {
+        let translucent =
+            |o: &crate::scene::Object| matches!(scene.materials[o.material].surface, Surface::Translucent(_));
+        let samples = scene.objects.iter().filter(|o| translucent(o)).count() as u64 * u64::from(options.cache_samples);
+        let what = format!("the cache of {samples} samples a pass");
+        let needed = u128::from(samples) * BYTES_PER_SAMPLE;
+        memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
         let lights = Lights::new(scene);
         let body = |(index, object): (usize, &crate::scene::Object)| {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };

@@ -37,7 +37,7 @@ pub struct Record {
     pub own: Option<SelfFigures>,
     /// Samples left out because they are not numbers.
     pub non_finite: u64,
-    /// Samples clamped: none, marmor clamps nothing.
+    /// Values of S_d below zero that were taken as 0; samples are never clamped.
     pub clamped: u64,
     /// Samples below zero, kept.
     pub negative: u64,

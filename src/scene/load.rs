@@ -9,8 +9,9 @@ use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
 use super::{Camera, Material, Object, Scene, Surface, warnings};
 use crate::error::{Error, Result};
-use crate::geometry::{Mended, Mesh, ObjMesh, examine, load_obj, mended, rectangle, sphere};
+use crate::geometry::{LOADING_BYTES, Mended, Mesh, ObjMesh, examine, load_obj, mended, rectangle, sphere};
 use crate::math::{DVec3, Vec3};
+use crate::memory;
 
 impl Scene {
     /// Reads the meshes of a scene file (each OBJ once) and makes the world from them. What is odd but can be
@@ -83,7 +84,13 @@ fn meshes(file: &SceneFile, repair: bool, said: &mut Vec<String>) -> Result<Vec<
     for entry in &file.objects {
         let mesh = match &entry.geometry {
             Geometry::Rectangle { centre, edge_u, edge_v } => rectangle(*centre, *edge_u, *edge_v),
-            Geometry::Sphere { centre, radius, rings, segments } => sphere(*centre, *radius, *rings, *segments),
+            Geometry::Sphere { centre, radius, rings, segments } => {
+                let triangles = 2 * u128::from(rings - 1) * u128::from(*segments);
+                let what = format!("{}: object {:?} of {triangles} triangles", entry.at, entry.name);
+                let needed = triangles * LOADING_BYTES as u128;
+                memory::require(needed, memory::available(), &what, "use fewer rings and segments")?;
+                sphere(*centre, *radius, *rings, *segments)
+            }
             Geometry::Mesh(path) => {
                 let path = folder.join(path);
                 let mesh = match read.get(&path) {
