@@ -160,17 +160,37 @@ fn render_tile<I: Integrator>(
 ) -> (Vec<Rgb>, Tally) {
     let camera = &view.scene.camera;
     let width = u64::from(camera.resolution[0]);
-    let mut rays = Vec::with_capacity(tile.area());
-    for y in tile.y0..tile.y1 {
-        for x in tile.x0..tile.x1 {
+    let pixels = pixels(tile);
+    let rays: Vec<CameraRay> = pixels
+        .iter()
+        .map(|&[x, y]| {
             let mut stream = PixelStream::new(job.seed, u64::from(y) * width + u64::from(x), pass);
             let ray = camera.ray([x, y], stream.next_2d());
-            rays.push(CameraRay { ray, stream });
-        }
-    }
+            CameraRay { ray, stream }
+        })
+        .collect();
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);
-    (out, tally)
+    let mut by_row = vec![Rgb::BLACK; out.len()];
+    for ([x, y], radiance) in pixels.into_iter().zip(out) {
+        by_row[((y - tile.y0) * (tile.x1 - tile.x0) + x - tile.x0) as usize] = radiance;
+    }
+    (by_row, tally)
+}
+
+/// The pixels of a tile in squares of eight by eight: neighbours in the list are neighbours in the picture, so that their
+/// rays go well together.
+fn pixels(tile: Window) -> Vec<[u32; 2]> {
+    const SQUARE: usize = 8;
+    let mut pixels = Vec::with_capacity(tile.area());
+    for y0 in (tile.y0..tile.y1).step_by(SQUARE) {
+        for x0 in (tile.x0..tile.x1).step_by(SQUARE) {
+            for y in y0..tile.y1.min(y0 + SQUARE as u32) {
+                pixels.extend((x0..tile.x1.min(x0 + SQUARE as u32)).map(|x| [x, y]));
+            }
+        }
+    }
+    pixels
 }
 
 /// `window` cut into tiles, row by row.
@@ -182,4 +202,19 @@ fn tiles(window: Window) -> Vec<Window> {
         }
     }
     tiles
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_of_a_tile_is_listed_once() {
+        let tile = Window { x0: 3, y0: 8, x1: 24, y1: 19 };
+        let mut listed = pixels(tile);
+        assert_eq!((listed[0], listed[8]), ([3, 8], [3, 9]));
+        listed.sort_by_key(|&[x, y]| (y, x));
+        let rows: Vec<[u32; 2]> = (8..19).flat_map(|y| (3..24).map(move |x| [x, y])).collect();
+        assert_eq!(listed, rows);
+    }
 }
