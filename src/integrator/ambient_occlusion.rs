@@ -1,9 +1,9 @@
 //! The share of the cosine-weighted hemisphere that is open.
 
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::math::Rgb;
+use crate::math::{Frame, Rgb};
 use crate::query::Ray;
-use crate::sampling::cosine_hemisphere;
+use crate::sampling::Pairs;
 use crate::scene::Scene;
 
 /// (1/π) ∫ V(ω) cosθ dω over the hemisphere on the camera's side; grey, in [0, 1]; 1 where nothing is hit.
@@ -23,14 +23,20 @@ impl Integrator for AmbientOcclusion {
         let hits = view.camera_hits(rays, tally);
 
         let per_hit = self.rays as usize;
-        let mut probes = Vec::with_capacity(rays.len() * per_hit);
+        let mut pairs = Pairs::with_capacity(rays.len() * per_hit);
+        let mut points = Vec::with_capacity(rays.len());
         for (ray, hit) in rays.iter().zip(&hits) {
             let Some(hit) = hit else { continue };
-            let at = view.point(hit, ray.ray.direction);
-            for part in 0..self.rays {
-                let w = cosine_hemisphere(at.n, ray.stream.split(part, self.rays).next_2d());
-                probes.push(Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) });
-            }
+            points.push(view.point(hit, ray.ray.direction));
+            pairs.push_splits(&ray.stream, self.rays);
+        }
+        let mut probes = Vec::with_capacity(points.len() * per_hit);
+        for (at, local) in points.iter().zip(pairs.cosine_hemisphere().chunks_exact(per_hit)) {
+            let frame = Frame::about(at.n);
+            probes.extend(local.iter().map(|&w| {
+                let w = frame.to_world(w);
+                Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) }
+            }));
         }
         let mut occluded = vec![false; probes.len()];
         view.rays.occluded_batch(&probes, &mut occluded);

@@ -57,6 +57,21 @@ impl PixelStream {
         Self { key, index: (index % u64::from(SEQUENCE_LENGTH)) as u32, dimension: 0 }
     }
 
+    /// Index and scramble of the first dimensions of every part, as [`Self::split`] has them.
+    pub(super) fn split_places(&self, parts: u32) -> impl Iterator<Item = (u32, u32)> {
+        let first = u64::from(self.index) * u64::from(parts);
+        let (mut sequence, mut seed) = (None, 0);
+        let this = *self;
+        (0..parts).map(move |part| {
+            let index = first + u64::from(part);
+            let of = index / u64::from(SEQUENCE_LENGTH);
+            if sequence != Some(of) {
+                (sequence, seed) = (Some(of), this.split(part, parts).set_seed(0));
+            }
+            ((index % u64::from(SEQUENCE_LENGTH)) as u32, seed)
+        })
+    }
+
     /// Goes on to dimensions that no earlier [`Self::split`] of this stream has used.
     #[inline]
     pub fn skip_split(&mut self) {

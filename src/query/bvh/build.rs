@@ -7,11 +7,11 @@
 
 use rayon::prelude::*;
 
-use super::STACK;
 use super::fold::{Fold, Place};
 use super::node::{Bounds, Child, Node, WIDTH};
 use super::split::{self, Range, Ref};
 use super::triangle::{LANES, Pack};
+use super::walk::STACK;
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Vec3};
 

@@ -1,13 +1,14 @@
 //! Camera rays together: up to 64 rays from one point walk the tree as one [ORM08].
 //!
-//! A box that the pyramid around all of them misses is passed by at once. Of a box that it meets, the rays are asked eight at
-//! a time, and no more of them than it takes to find one that enters; who comes before that one stays outside below it,
-//! too. Only leaves ask every ray. Each ray's tests are those it would make alone, to the bit.
+//! A box that the pyramid around all of them misses is passed by at once. Of a box that it meets, the rays of those eights
+//! are asked that have met the box around it. Where only few rays are left they go on one by one, from there. Each ray's
+//! tests are those it would make alone, to the bit.
 
+use super::build::Tree;
 use super::node::{Child, NodeRay, Slabs, WIDENED, WIDTH};
 use super::stack::Stack;
 use super::triangle::{LANES, Shear, Sheared, longest_axis};
-use super::{Closest, Found, STACK, Tree};
+use super::walk::{Closest, Found, OneRay, STACK};
 use crate::math::{F8, LaneKernel, Simd, splat3};
 use crate::query::Ray;
 
@@ -17,6 +18,10 @@ const RAYS: usize = 8;
 const PACKETS: usize = 8;
 /// Groups of fewer rays than this are traced one by one.
 const FEWEST: usize = 2 * RAYS;
+/// From a box that no more rays than this enter they go on alone.
+const ALONE: u32 = 5;
+/// Triangles of a leaf are tested by no fewer rays of an eight than this; fewer rays test the eight triangles each.
+const TOGETHER: u32 = 5;
 /// Slopes of the rays of a group differ from the first one's by no more than this.
 const SPREAD: f32 = 0.1;
 
@@ -28,7 +33,7 @@ pub struct ClosestBatch<'a, F> {
     pub give: F,
 }
 
-impl<F: FnMut(usize, Option<Found>)> LaneKernel for ClosestBatch<'_, F> {
+impl<F: FnMut(usize, &Found)> LaneKernel for ClosestBatch<'_, F> {
     type Out = ();
 
     #[inline(always)]
@@ -38,16 +43,16 @@ impl<F: FnMut(usize, Option<Found>)> LaneKernel for ClosestBatch<'_, F> {
             let rest = &self.rays[done..];
             let run = run_length(rest);
             match self.tree.root {
-                Some(root @ Child::Inner(_)) if run >= FEWEST => {
+                Some(Child::Inner(root)) if run >= FEWEST => {
                     let mut group = Group::new(simd, &rest[..run]);
                     group.trace(self.tree, root);
                     for i in 0..run {
-                        (self.give)(done + i, group.packets[i / RAYS].found(i % RAYS));
+                        (self.give)(done + i, &group.packets[i / RAYS].best[i % RAYS]);
                     }
                 }
                 _ => {
                     for (i, ray) in rest[..run].iter().enumerate() {
-                        (self.give)(done + i, Closest { tree: self.tree, ray }.run(simd));
+                        (self.give)(done + i, &Closest { tree: self.tree, ray }.run(simd));
                     }
                 }
             }
@@ -81,35 +86,32 @@ fn run_length(rays: &[Ray]) -> usize {
 }
 
 /// Eight rays and what they have found so far.
+#[derive(Clone, Copy)]
 struct Packet<S: Simd> {
     slabs: Slabs<S>,
     sheared: Sheared<S>,
-    /// The best hit so far, or the ray's end.
+    best: [Found; RAYS],
+    /// Of each ray, `best.t`.
     t: [f32; RAYS],
-    /// The first distance that is no longer of use; beyond the best hit only by a tie.
+    /// Of each ray, `best.t_end()`.
     t_end: [f32; RAYS],
-    /// Pack and lane of the best hit.
-    place: [(u32, u32); RAYS],
-    u: [f32; RAYS],
-    v: [f32; RAYS],
 }
 
-const NOTHING: (u32, u32) = (u32::MAX, u32::MAX);
-
 impl<S: Simd> Packet<S> {
-    /// Places left over repeat the first ray.
+    /// The first eight of `rays`; places left over repeat `any` and end where they begin.
     #[inline(always)]
-    fn new(simd: S, rays: &[Ray], axes: [usize; 3]) -> Self {
+    fn new(simd: S, rays: &[Ray], any: &Ray, axes: [usize; 3]) -> Self {
         let mut directions = [[0.0; RAYS]; 3];
         let (mut t_min, mut t) = ([0.0; RAYS], [0.0; RAYS]);
         for i in 0..RAYS {
-            let ray = rays.get(i).unwrap_or(&rays[0]);
+            let ray = rays.get(i).unwrap_or(any);
             for (along, axis) in directions.iter_mut().zip(ray.direction.to_array()) {
                 along[i] = axis;
             }
-            (t_min[i], t[i]) = (ray.t_min, ray.t_max);
+            t_min[i] = ray.t_min;
+            t[i] = if i < rays.len() { ray.t_max } else { 0.0 };
         }
-        let origin = splat3(simd, rays[0].origin.to_array());
+        let origin = splat3(simd, any.origin.to_array());
         let d = load3(simd, &directions);
         let (one, widened) = (F8::splat(simd, 1.0), F8::splat(simd, WIDENED));
         let inverse = [one / d[0], one / d[1], one / d[2]];
@@ -125,17 +127,17 @@ impl<S: Simd> Packet<S> {
                 origin: [origin[kx], origin[ky], origin[kz]],
                 by: [d[kx] / d[kz], d[ky] / d[kz], inverse[kz]],
             },
+            best: t.map(Found::nothing),
             t,
             t_end: t,
-            place: [NOTHING; RAYS],
-            u: [0.0; RAYS],
-            v: [0.0; RAYS],
         }
     }
 
-    fn found(&self, i: usize) -> Option<Found> {
-        let (pack, lane) = self.place[i];
-        (pack != u32::MAX).then_some(Found { t: self.t[i], pack, lane, u: self.u[i], v: self.v[i] })
+    #[inline(always)]
+    fn set(&mut self, i: usize, found: Found) {
+        self.best[i] = found;
+        self.t[i] = found.t;
+        self.t_end[i] = found.t_end();
     }
 }
 
@@ -202,10 +204,9 @@ impl<S: Simd> Pyramid<S> {
 }
 
 /// Rays that go together.
-struct Group<S: Simd> {
+struct Group<'a, S: Simd> {
+    rays: &'a [Ray],
     packets: [Packet<S>; PACKETS],
-    /// Packets in use.
-    count: usize,
     pyramid: Pyramid<S>,
     axes: [usize; 3],
     /// Which end of a slab comes first.
@@ -215,19 +216,27 @@ struct Group<S: Simd> {
     simd: S,
 }
 
-impl<S: Simd> Group<S> {
+/// A box to visit: its node, its lane there, and the packets that have entered the box around it.
+#[derive(Clone, Copy)]
+struct Place {
+    node: u32,
+    lane: u8,
+    packets: u8,
+}
+
+impl<'a, S: Simd> Group<'a, S> {
     #[inline(always)]
-    fn new(simd: S, rays: &[Ray]) -> Self {
+    fn new(simd: S, rays: &'a [Ray]) -> Self {
         let axes = Shear::new(&rays[0]).axes;
-        let count = rays.len().div_ceil(RAYS);
-        let packets = std::array::from_fn(|i| {
-            Packet::new(simd, rays.get(i * RAYS..).filter(|r| !r.is_empty()).unwrap_or(rays), axes)
-        });
+        let mut packets = [Packet::new(simd, rays, &rays[0], axes); PACKETS];
+        for (i, packet) in packets.iter_mut().enumerate().skip(1) {
+            *packet = Packet::new(simd, rays.get(i * RAYS..).unwrap_or(&[]), &rays[0], axes);
+        }
         let t_max = rays.iter().map(|r| r.t_max).fold(0.0, f32::max);
         Self {
-            pyramid: Pyramid::new(simd, &packets[..count]),
+            pyramid: Pyramid::new(simd, &packets),
+            rays,
             packets,
-            count,
             axes,
             first: NodeRay::new(simd, &rays[0]).first(),
             t_max,
@@ -236,41 +245,19 @@ impl<S: Simd> Group<S> {
     }
 
     #[inline(always)]
-    fn trace(&mut self, tree: &Tree, root: Child) {
-        // Of each box to visit: its place in its node, the first packet that may enter, a distance before which none does.
-        let mut stack = Stack::<STACK>::new();
-        let Child::Inner(root) = root else { return };
-        self.push_children(tree, root, 0, &mut stack);
+    fn trace(&mut self, tree: &Tree, root: u32) {
+        let mut stack = Stack::<Place, STACK>::new();
+        let all = 0xff >> (PACKETS - self.rays.len().div_ceil(RAYS));
+        self.push_children(tree, root, all, &mut stack);
         while let Some((place, near)) = stack.pop() {
-            if near > self.t_max {
-                continue;
-            }
-            let (node, lane, from) = unpack(place);
-            let node = &tree.nodes[node as usize];
-            let (first, last) = node.box_planes(self.simd, lane, self.first);
-            let mut packet = from;
-            loop {
-                if packet >= self.count {
-                    break;
-                }
-                let p = &self.packets[packet % PACKETS];
-                if p.slabs.enter(first, last, F8::load(self.simd, &p.t)).0 != 0 {
-                    break;
-                }
-                packet += 1;
-            }
-            if packet >= self.count {
-                continue;
-            }
-            match Child::from_bits(node.child_bits(lane)) {
-                Child::Inner(index) => self.push_children(tree, index, packet, &mut stack),
-                Child::Leaf(pack) => self.meet(tree, pack, packet, first, last),
+            if near <= self.t_max {
+                self.visit(tree, place, &mut stack);
             }
         }
     }
 
     #[inline(always)]
-    fn push_children(&self, tree: &Tree, index: u32, packet: usize, stack: &mut Stack<STACK>) {
+    fn push_children(&self, tree: &Tree, index: u32, packets: u8, stack: &mut Stack<Place, STACK>) {
         let node = &tree.nodes[index as usize];
         let (first, last) = node.all_planes(self.simd, self.first);
         let (mut inside, near) = self.pyramid.enter(first, last, F8::splat(self.simd, self.t_max));
@@ -279,59 +266,103 @@ impl<S: Simd> Group<S> {
         while inside != 0 {
             let lane = inside.trailing_zeros() as usize % WIDTH;
             inside &= inside - 1;
-            stack.insert(from, pack_up(index, lane, packet), near[lane]);
+            stack.insert(from, Place { node: index, lane: lane as u8, packets }, near[lane]);
         }
     }
 
-    /// All rays from packet `from` on against the triangles of a leaf.
     #[inline(always)]
-    fn meet(&mut self, tree: &Tree, pack: u32, from: usize, first: [F8<S>; 3], last: [F8<S>; 3]) {
+    fn visit(&mut self, tree: &Tree, place: Place, stack: &mut Stack<Place, STACK>) {
+        let node = &tree.nodes[place.node as usize];
+        let (first, last) = node.box_planes(self.simd, place.lane as usize, self.first);
+        let mut entered = [0_u8; PACKETS];
+        let mut enters = [F8::splat(self.simd, 0.0); PACKETS];
+        let (mut packets, mut count) = (0, 0);
+        let mut rest = place.packets;
+        while rest != 0 {
+            let p = rest.trailing_zeros() as usize % PACKETS;
+            rest &= rest - 1;
+            let packet = &self.packets[p];
+            let (lanes, near) = packet.slabs.enter(first, last, F8::load(self.simd, &packet.t));
+            (entered[p], enters[p]) = (lanes as u8, near);
+            if lanes != 0 {
+                packets |= 1 << p;
+                count += lanes.count_ones();
+            }
+        }
+        match Child::from_bits(node.child_bits(place.lane as usize)) {
+            _ if packets == 0 => {}
+            Child::Inner(index) if count > ALONE => self.push_children(tree, index, packets, stack),
+            Child::Leaf(pack) if count > ALONE => self.meet(tree, pack, packets, &entered, &enters),
+            child => {
+                while packets != 0 {
+                    let p = packets.trailing_zeros() as usize % PACKETS;
+                    packets &= packets - 1;
+                    self.alone(tree, child, p, entered[p], enters[p]);
+                }
+                self.shorten();
+            }
+        }
+    }
+
+    /// Each of the rays `lanes` of packet `p` below `child`.
+    #[inline(always)]
+    fn alone(&mut self, tree: &Tree, child: Child, p: usize, mut lanes: u8, enters: F8<S>) {
+        let enters = enters.to_array();
+        let packet = &mut self.packets[p];
+        while lanes != 0 {
+            let i = lanes.trailing_zeros() as usize % RAYS;
+            lanes &= lanes - 1;
+            let Some(ray) = self.rays.get(p * RAYS + i) else { return }; // a place left over
+            let found = OneRay::new(self.simd, ray).closest(tree, child, enters[i], packet.best[i]);
+            packet.set(i, found);
+        }
+    }
+
+    /// The rays that have entered a leaf against its triangles.
+    #[inline(always)]
+    fn meet(&mut self, tree: &Tree, pack: u32, mut packets: u8, entered: &[u8; PACKETS], enters: &[F8<S>; PACKETS]) {
         let triangles = &tree.packs[pack as usize];
         let owners = &tree.owners[pack as usize];
         let simd = self.simd;
-        let mut met_any = false;
-        for packet in &mut self.packets[from..self.count] {
-            let (entered, enters) = packet.slabs.enter(first, last, F8::load(simd, &packet.t));
-            if entered == 0 {
+        while packets != 0 {
+            let p = packets.trailing_zeros() as usize % PACKETS;
+            packets &= packets - 1;
+            let entered = entered[p];
+            if entered.count_ones() < TOGETHER {
+                self.alone(tree, Child::Leaf(pack), p, entered, enters[p]);
                 continue;
             }
+            let packet = &mut self.packets[p];
             for lane in 0..LANES {
                 if lane > 0 && owners[lane] == owners[0] {
                     break; // places left over
                 }
                 let inside = packet.sheared.inside(triangles.corners_of(simd, lane, self.axes));
-                if inside.lanes & entered == 0 {
+                if inside.lanes & u32::from(entered) == 0 {
                     continue;
                 }
-                let met = packet.sheared.meet(&inside, enters, packet.slabs.t_min, F8::load(simd, &packet.t_end));
-                let mut lanes = met.lanes & entered;
-                met_any |= lanes != 0;
+                let met = packet.sheared.meet(&inside, enters[p], packet.slabs.t_min, F8::load(simd, &packet.t_end));
+                let mut lanes = met.lanes & u32::from(entered);
                 while lanes != 0 {
                     let i = lanes.trailing_zeros() as usize % RAYS;
                     lanes &= lanes - 1;
-                    let place = (pack, lane as u32);
-                    if met.t[i] < packet.t[i] || place < packet.place[i] {
-                        (packet.t[i], packet.place[i]) = (met.t[i], place);
-                        (packet.u[i], packet.v[i]) = (met.u[i], met.v[i]);
-                        packet.t_end[i] = met.t[i].next_up();
+                    let found = Found { t: met.t[i], place: (pack, lane as u32), u: met.u[i], v: met.v[i] };
+                    if found.t < packet.t[i] || found.place < packet.best[i].place {
+                        packet.set(i, found);
                     }
                 }
             }
         }
-        if met_any {
-            let mut t = F8::load(simd, &self.packets[0].t);
-            for packet in &self.packets[1..self.count] {
-                t = t.max(F8::load(simd, &packet.t));
-            }
-            self.t_max = greatest(t);
-        }
+        self.shorten();
     }
-}
 
-fn pack_up(node: u32, lane: usize, packet: usize) -> u32 {
-    node << 6 | (lane << 3 | packet) as u32
-}
-
-fn unpack(place: u32) -> (u32, usize, usize) {
-    (place >> 6, (place >> 3) as usize % WIDTH, place as usize % PACKETS)
+    /// Looks no farther than the ray that may still look farthest.
+    #[inline(always)]
+    fn shorten(&mut self) {
+        let mut t = F8::load(self.simd, &self.packets[0].t);
+        for packet in &self.packets[1..] {
+            t = t.max(F8::load(self.simd, &packet.t));
+        }
+        self.t_max = greatest(t);
+    }
 }

@@ -1,6 +1,6 @@
 //! The backend in pure Rust: a tree of eight children a node over packs of eight triangles.
-//! Read first: this file, which walks the tree; `triangle.rs` has the test of a pack, `node.rs` that of a node's boxes,
-//! `build.rs` makes the tree.
+//! Read first: `walk.rs`, one ray through the tree; `triangle.rs` has the test of a pack, `node.rs` that of a node's boxes,
+//! `coherent.rs` takes many rays at once, `build.rs` makes the tree.
 //!
 //! A ray's answer is the least of (distance, place in the tree) over all triangles that it meets, and no distance is less
 //! than that at which the ray enters the triangle's box. So it depends neither on the order in which boxes are visited, nor
@@ -14,33 +14,19 @@ mod split;
 #[allow(unsafe_code)] // reads what it has written into memory that was not cleared; nothing else
 mod stack;
 mod triangle;
+mod walk;
 
 use super::{Hit, Ray, RayQuery};
 use crate::geometry::Mesh;
-use crate::math::{LaneKernel, Lanes, Level, Simd};
+use crate::math::{Lanes, Level};
 use build::Tree;
 use coherent::ClosestBatch;
-use node::{Child, NodeRay};
-use stack::Stack;
-use triangle::TriangleRay;
-
-/// Entries of a traversal's stack; the builder makes no tree that needs more.
-const STACK: usize = 256;
+use walk::{Closest, Found, Occluded};
 
 /// Meshes, copied into a tree.
 pub struct Bvh {
     tree: Tree,
     lanes: Lanes,
-}
-
-/// The best hit so far, by its place in the tree.
-#[derive(Clone, Copy)]
-struct Found {
-    t: f32,
-    pack: u32,
-    lane: u32,
-    u: f32,
-    v: f32,
 }
 
 impl Bvh {
@@ -54,168 +40,32 @@ impl Bvh {
         Self { tree: Tree::new(meshes), lanes: Lanes::at(level) }
     }
 
-    fn hit(&self, found: &Found) -> Hit {
-        let owner = self.tree.owners[found.pack as usize][found.lane as usize];
-        Hit { t: found.t, mesh: owner.mesh, triangle: owner.triangle, u: found.u, v: found.v }
-    }
-}
-
-/// The first triangle along a ray.
-struct Closest<'a> {
-    tree: &'a Tree,
-    ray: &'a Ray,
-}
-
-impl LaneKernel for Closest<'_> {
-    type Out = Option<Found>;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> Option<Found> {
-        let Self { tree, ray } = self;
-        let (node_ray, triangle_ray) = (NodeRay::new(simd, ray), TriangleRay::new(simd, ray));
-        let mut best = Found { t: ray.t_max, pack: u32::MAX, lane: 0, u: 0.0, v: 0.0 };
-        // The first distance that is no longer of use; beyond the best hit only by a tie.
-        let mut t_end = ray.t_max;
-        let mut stack = Stack::<STACK>::new();
-        let (mut child, mut enters) = (tree.root?.to_bits(), ray.t_min);
-        loop {
-            match Child::from_bits(child) {
-                Child::Inner(index) => {
-                    let node = &tree.nodes[index as usize];
-                    let (mut inside, near) = node.enter(&node_ray, best.t);
-                    if inside != 0 {
-                        let near = near.to_array();
-                        let mut next = || {
-                            let i = inside.trailing_zeros() as usize % node::WIDTH;
-                            inside &= inside - 1;
-                            ((node.child_bits(i), near[i]), inside != 0)
-                        };
-                        let (first, more) = next();
-                        (child, enters) = first;
-                        if !more {
-                            continue;
-                        }
-                        let (second, more) = next();
-                        if !more {
-                            let (nearer, farther) = if second.1 < first.1 { (second, first) } else { (first, second) };
-                            stack.push(farther.0, farther.1);
-                            (child, enters) = nearer;
-                            continue;
-                        }
-                        let from = stack.len();
-                        stack.push(first.0, first.1);
-                        stack.insert(from, second.0, second.1);
-                        loop {
-                            let (other, more) = next();
-                            stack.insert(from, other.0, other.1);
-                            if !more {
-                                break;
-                            }
-                        }
-                    }
-                }
-                Child::Leaf(pack) => {
-                    if let Some(hit) =
-                        tree.packs[pack as usize].meet(&triangle_ray, enters, t_end).and_then(|m| m.nearest())
-                        && (hit.t < best.t || pack < best.pack)
-                    {
-                        best = Found { t: hit.t, pack, lane: hit.lane as u32, u: hit.u, v: hit.v };
-                        t_end = hit.t.next_up();
-                    }
-                }
-            }
-            loop {
-                let Some(next) = stack.pop() else { return (best.pack != u32::MAX).then_some(best) };
-                (child, enters) = next;
-                if enters <= best.t {
-                    break;
-                }
-            }
-        }
-    }
-}
-
-/// Whether there is a triangle along a ray.
-struct Occluded<'a> {
-    tree: &'a Tree,
-    ray: &'a Ray,
-}
-
-impl LaneKernel for Occluded<'_> {
-    type Out = bool;
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) -> bool {
-        let Self { tree, ray } = self;
-        let Some(root) = tree.root else { return false };
-        let (node_ray, triangle_ray) = (NodeRay::new(simd, ray), TriangleRay::new(simd, ray));
-        let mut stack = Stack::<STACK>::new();
-        let (mut child, mut enters) = (root.to_bits(), ray.t_min);
-        loop {
-            match Child::from_bits(child) {
-                Child::Inner(index) => {
-                    let node = &tree.nodes[index as usize];
-                    let (mut inside, near) = node.enter(&node_ray, ray.t_max);
-                    if inside != 0 {
-                        let near = near.to_array();
-                        loop {
-                            let i = inside.trailing_zeros() as usize % node::WIDTH;
-                            (child, enters) = (node.child_bits(i), near[i]);
-                            inside &= inside - 1;
-                            if inside == 0 {
-                                break;
-                            }
-                            stack.push(child, enters);
-                        }
-                        continue;
-                    }
-                }
-                Child::Leaf(pack) => {
-                    if tree.packs[pack as usize].meet(&triangle_ray, enters, ray.t_max).is_some() {
-                        return true;
-                    }
-                }
-            }
-            let Some(next) = stack.pop() else { return false };
-            (child, enters) = next;
-        }
-    }
-}
-
-/// Whether there is a triangle along each of several rays.
-struct OccludedBatch<'a> {
-    tree: &'a Tree,
-    rays: &'a [Ray],
-    out: &'a mut [bool],
-}
-
-impl LaneKernel for OccludedBatch<'_> {
-    type Out = ();
-
-    #[inline(always)]
-    fn run<S: Simd>(self, simd: S) {
-        for (ray, out) in self.rays.iter().zip(self.out) {
-            *out = Occluded { tree: self.tree, ray }.run(simd);
-        }
+    fn hit(&self, found: &Found) -> Option<Hit> {
+        found.is_hit().then(|| {
+            let owner = self.tree.owners[found.place.0 as usize][found.place.1 as usize];
+            Hit { t: found.t, mesh: owner.mesh, triangle: owner.triangle, u: found.u, v: found.v }
+        })
     }
 }
 
 impl RayQuery for Bvh {
     fn closest(&self, ray: &Ray) -> Option<Hit> {
-        self.lanes.run(Closest { tree: &self.tree, ray }).map(|found| self.hit(&found))
+        self.hit(&self.lanes.run(Closest { tree: &self.tree, ray }))
     }
 
     fn occluded(&self, ray: &Ray) -> bool {
-        self.lanes.run(Occluded { tree: &self.tree, ray })
+        let mut out = [false];
+        self.lanes.run(Occluded { tree: &self.tree, rays: std::slice::from_ref(ray), out: &mut out });
+        out[0]
     }
 
     fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        let give = |i: usize, found: Option<Found>| hits[i] = found.map(|found| self.hit(&found));
+        let give = |i: usize, found: &Found| hits[i] = self.hit(found);
         self.lanes.run(ClosestBatch { tree: &self.tree, rays, give });
     }
 
     fn occluded_batch(&self, rays: &[Ray], out: &mut [bool]) {
-        self.lanes.run(OccludedBatch { tree: &self.tree, rays, out });
+        self.lanes.run(Occluded { tree: &self.tree, rays, out });
     }
 
     fn description(&self) -> String {

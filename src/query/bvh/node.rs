@@ -59,6 +59,7 @@ impl Child {
 pub const WIDENED: f32 = 1.0 + 4.0 * f32::EPSILON;
 
 /// Rays or boxes, eight of them, as the test of slabs wants them: one ray and eight boxes, or eight rays and one box.
+#[derive(Clone, Copy)]
 pub struct Slabs<S: Simd> {
     /// Start [unit].
     pub origin: [F8<S>; 3],

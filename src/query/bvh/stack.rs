@@ -2,14 +2,14 @@
 
 use std::mem::MaybeUninit;
 
-/// Children still to visit, with the distance at which the ray enters them.
-pub struct Stack<const N: usize> {
-    entries: [MaybeUninit<(u32, f32)>; N],
+/// What is still to visit, with the distance at which the ray enters it.
+pub struct Stack<T, const N: usize> {
+    entries: [MaybeUninit<(T, f32)>; N],
     /// The entries before this one have been written.
     waiting: usize,
 }
 
-impl<const N: usize> Stack<N> {
+impl<T: Copy, const N: usize> Stack<T, N> {
     #[inline(always)]
     pub fn new() -> Self {
         Self { entries: [const { MaybeUninit::uninit() }; N], waiting: 0 }
@@ -22,20 +22,20 @@ impl<const N: usize> Stack<N> {
     }
 
     #[inline(always)]
-    pub fn push(&mut self, child: u32, enters: f32) {
+    pub fn push(&mut self, child: T, enters: f32) {
         self.entries[self.waiting] = MaybeUninit::new((child, enters));
         self.waiting += 1;
     }
 
     #[inline(always)]
-    pub fn pop(&mut self) -> Option<(u32, f32)> {
+    pub fn pop(&mut self) -> Option<(T, f32)> {
         self.waiting = self.waiting.checked_sub(1)?;
         Some(self.entry(self.waiting))
     }
 
     /// Adds an entry where it belongs among those from `from` on, of which the farthest lies lowest.
     #[inline(always)]
-    pub fn insert(&mut self, from: usize, child: u32, enters: f32) {
+    pub fn insert(&mut self, from: usize, child: T, enters: f32) {
         self.push(child, enters);
         let mut i = self.waiting - 1;
         while i > from && self.entry(i - 1).1 < enters {
@@ -46,7 +46,7 @@ impl<const N: usize> Stack<N> {
     }
 
     #[inline(always)]
-    fn entry(&self, i: usize) -> (u32, f32) {
+    fn entry(&self, i: usize) -> (T, f32) {
         debug_assert!(i <= self.waiting);
         // SAFETY: called for places below `waiting` and for the one that `pop` has just taken off: `push` has written all
         // of them, since `waiting` grows there alone.
@@ -60,7 +60,7 @@ mod tests {
 
     #[test]
     fn entries_come_back_in_the_order_they_were_put() {
-        let mut stack = Stack::<8>::new();
+        let mut stack = Stack::<u32, 8>::new();
         assert_eq!(stack.pop(), None);
         stack.push(1, 9.0);
         stack.push(2, 0.5);
@@ -76,7 +76,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "index out of bounds")]
     fn a_full_stack_takes_no_more() {
-        let mut stack = Stack::<2>::new();
+        let mut stack = Stack::<u32, 2>::new();
         for i in 0..3 {
             stack.push(i, 0.0);
         }

@@ -62,6 +62,7 @@ impl Shear {
 }
 
 /// Eight pairs of a ray and a triangle: one ray with eight triangles, or eight rays with one. All rays have the same axes.
+#[derive(Clone, Copy)]
 pub struct Sheared<S: Simd> {
     /// Start, in the order of the axes [unit].
     pub origin: [F8<S>; 3],
