@@ -9,8 +9,8 @@ use crate::optics::Medium;
 const STEPS: u32 = 4;
 /// Bits of an f32 below a step.
 const SHIFT: u32 = 23 - STEPS.trailing_zeros();
-/// Exponents of r² [unit²] covered, 2^-60 .. 2^60, as biased exponents of f32.
-const EXPONENTS: std::ops::Range<u32> = 67..187;
+/// Exponents of r² [unit²] covered, 2^-100 .. 2^100, as biased exponents of f32.
+const EXPONENTS: std::ops::Range<u32> = 27..227;
 
 /// S_d and its slope at one distance, up to a common factor.
 #[derive(Clone, Copy, Debug, Default)]
