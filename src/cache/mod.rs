@@ -76,6 +76,17 @@ pub struct GatherTally {
     pub clamped: u64,
 }
 
+impl GatherTally {
+    /// Counts the channels in which S_d is 0, of a model that `clamps`: for pairs kept by rejection control, whose values
+    /// are of the size of S_d near the entry, nothing else is 0.
+    #[inline]
+    fn count_clamped(&mut self, clamps: bool, s: Rgb, flux: Rgb) {
+        if clamps {
+            self.clamped += (0..3).filter(|&c| s[c] == 0.0 && flux[c] > 0.0).count() as u64;
+        }
+    }
+}
+
 impl std::ops::AddAssign for GatherTally {
     fn add_assign(&mut self, other: Self) {
         self.samples += other.samples;

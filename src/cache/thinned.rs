@@ -48,7 +48,9 @@ pub fn thinned<B: Bssrdf>(thinning: &Thinning, model: &B, exit: &Exit, key: u64,
             let chance = (-decay * sample.entry.x.distance(exit.x)).exp();
             if numbers.uniform() * f64::from(bound) < f64::from(chance) {
                 tally.evaluated += 1;
-                let light = model.eval_cached(&sample.entry, sample.depth, exit, decay) * sample.flux;
+                let s = model.eval_cached(&sample.entry, sample.depth, exit, decay);
+                tally.count_clamped(model.clamps(), s, sample.flux);
+                let light = s * sample.flux;
                 for c in 0..3 {
                     sum[c] += f64::from(light[c]);
                 }
