@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // a scene that does not load has failed
 
 use marmor::bssrdf::{Bssrdf, Exit, Model, ModelName, ModelVisitor};
-use marmor::cache::{CachedSample, Density, Envelope, Filler, NearField, Survey, seen};
+use marmor::cache::{CachedSample, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
 use marmor::geometry::AreaTable;
 use marmor::light::Lights;
 use marmor::math::{Rgb, Vec3, hash};
@@ -150,10 +150,12 @@ fn the_near_field_is_the_part_that_the_cache_leaves_out() {
             let hit = set.rays.closest(&query::Ray::new(9.0 * from, -from)).unwrap();
             let at = set.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
             let exit = Exit { x: at.x, n: at.n_geometric, w: at.n_geometric };
-            let own = statistics(
-                (0..4000)
-                    .map(|i| f64::from(near.estimate(&filler, &exit, hash(i + 1), &mut RayTally::default()).mean())),
-            );
+            let own = statistics((0..4000).map(|i| {
+                f64::from(
+                    near.estimate(&filler, &exit, hash(i + 1), (&mut RayTally::default(), &mut GatherTally::default()))
+                        .mean(),
+                )
+            }));
             let cached = statistics((0..300).map(|i| {
                 let cache = filler.fill(i * 2000, 2000, &mut RayTally::default());
                 set.model.visit(Near(&near, &set.model, &cache.lit, &exit)) / 2000.0

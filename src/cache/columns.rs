@@ -159,8 +159,8 @@ impl Columns {
     }
 
     /// Σ S_d · weight per channel over all samples, by the vectorised code of `model` where it has one; of S_d the part
-    /// that is far by `partition`, from the points of the columns. Values of
-    /// S_d below zero, which count as 0, add to `clamped`.
+    /// that is far by `partition`, from the points of the columns. Values of S_d below zero, which count as 0, add to
+    /// `clamped`.
     pub fn sum(&self, model: &Model, exit: &Exit, partition: Partition, clamped: &mut u64) -> [f64; 3] {
         let c = &self.columns;
         let entries = EntryColumns { x: &c[0], y: &c[1], z: &c[2], weight: [&c[3], &c[4], &c[5]], partition };

@@ -112,7 +112,8 @@ impl Gatherer {
                 let count = columns.len() as u64 * exits.len() as u64;
                 tally.pairs += count;
                 tally.evaluated += count;
-                out.extend(exits.iter().map(|exit| mean(columns.sum(model, exit, partition, &mut tally.clamped))));
+                let mut sum = |exit| columns.sum(model, exit, partition, &mut tally.clamped);
+                out.extend(exits.iter().map(|exit| mean(sum(exit))));
             }
             Prepared::Cut(cutting) => {
                 let Cutting { tree, clusters } = &**cutting;

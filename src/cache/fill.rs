@@ -72,7 +72,8 @@ impl Filler<'_> {
             let (at, weight, u) = self.point(number);
             let place = self.density.place(self.stream.numbers(number).0).0;
             let (sample, shadow) = self.entering(at, weight, u, &mut RayTally::default())?;
-            (sample.is_finite() && !shadow.is_some_and(|ray| self.rays.occluded(&ray))).then_some((place, sample))
+            let hidden = shadow.is_some_and(|ray| self.rays.occluded(&ray));
+            (sample.is_finite() && !hidden).then_some((place, sample))
         };
         (0..u64::from(count)).into_par_iter().filter_map(lit).collect()
     }
@@ -109,7 +110,7 @@ impl Filler<'_> {
     }
 
     /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
-    /// and some by the cosine, each counts over the density of both [Veach 1997, balance heuristic].
+    /// and some by the cosine, each counts over the density of both [Vea97], the balance heuristic.
     fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut RayTally) -> Option<(Arrival, bool)> {
         let share = self.cosine_share;
         if !self.lights.has_emitters() {

@@ -68,23 +68,14 @@ pub struct GatherTally {
     pub nodes: u64,
     /// Pairs of exit point and cached sample looked at.
     pub pairs: u64,
+    /// Points of the near field found for an exit, where S_d was evaluated.
+    pub near: u64,
     /// Pairs where S_d was evaluated: those kept by rejection control, all of a plain sum, or those in a cut.
     pub evaluated: u64,
     /// Samples left out because a number of theirs is NaN or infinite.
     pub non_finite: u64,
     /// Values of S_d below zero that were taken as 0, one for each pair and channel.
     pub clamped: u64,
-}
-
-impl GatherTally {
-    /// Counts the channels in which S_d is 0, of a model that `clamps`: for pairs kept by rejection control, whose values
-    /// are of the size of S_d near the entry, nothing else is 0.
-    #[inline]
-    fn count_clamped(&mut self, clamps: bool, s: Rgb, flux: Rgb) {
-        if clamps {
-            self.clamped += (0..3).filter(|&c| s[c] == 0.0 && flux[c] > 0.0).count() as u64;
-        }
-    }
 }
 
 impl std::ops::AddAssign for GatherTally {
@@ -95,6 +86,7 @@ impl std::ops::AddAssign for GatherTally {
         self.nodes += other.nodes;
         self.pairs += other.pairs;
         self.evaluated += other.evaluated;
+        self.near += other.near;
         self.non_finite += other.non_finite;
         self.clamped += other.clamped;
     }

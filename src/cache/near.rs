@@ -1,7 +1,7 @@
 //! Light that enters close to an exit, sampled anew for each exit: for media whose light does not come as far as the next
 //! sample of a cache.
 
-use super::{CachedSample, Envelope, Filler};
+use super::{CachedSample, Envelope, Filler, GatherTally};
 use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor, Partition};
 use crate::geometry::SurfacePoint;
 use crate::math::{Frame, Rgb, Vec3, hash, unit_f32};
@@ -66,7 +66,13 @@ impl NearField {
 
     /// One estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for `exit`, seeded by `key`: all surfaces found along some lines
     /// parallel to the normal, and along one parallel to a tangent, each over the density of them all.
-    pub fn estimate(&self, filler: &Filler<'_>, exit: &Exit, key: u64, tally: &mut RayTally) -> Rgb {
+    pub fn estimate(
+        &self,
+        filler: &Filler<'_>,
+        exit: &Exit,
+        key: u64,
+        (rays, gather): (&mut RayTally, &mut GatherTally),
+    ) -> Rgb {
         let frame = Frame::about(exit.n);
         let axes = [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a));
         let [turn, shift, across] = [0, 1, 2].map(|i| Numbers(key).at(i));
@@ -75,10 +81,10 @@ impl NearField {
             // Radii in equal shares of the light, directions a golden angle apart.
             let radius = (line as f32 + Numbers(key).at(3 + u64::from(line))) / LINES as f32;
             let angle = (turn + line as f32 * 0.618_034).fract();
-            sum += self.probe(filler, exit, (&axes, 0), [radius, angle], (key, line), tally);
+            sum += self.probe(filler, exit, (&axes, 0), [radius, angle], (key, line), (rays, gather));
         }
         let tangent = 1 + usize::from(across >= 0.5);
-        sum + self.probe(filler, exit, (&axes, tangent), [shift, turn], (!key, 0), tally)
+        sum + self.probe(filler, exit, (&axes, tangent), [shift, turn], (!key, 0), (rays, gather))
     }
 
     /// What is found along a line parallel to one of the axes.
@@ -89,7 +95,7 @@ impl NearField {
         (axes, chosen): (&[Vec3; 3], usize),
         [radius, angle]: [f32; 2],
         (key, line): (u64, u32),
-        tally: &mut RayTally,
+        (rays, gather): (&mut RayTally, &mut GatherTally),
     ) -> Rgb {
         let (axis, aside, other) = (axes[chosen], axes[(chosen + 1) % 3], axes[(chosen + 2) % 3]);
         let r = self.ring(radius);
@@ -99,7 +105,7 @@ impl NearField {
         let mut ray = Ray { origin: middle + axis * half, direction: -axis, t_min: 0.0, t_max: 2.0 * half };
         let (mut sum, mut last, mut found) = (Rgb::BLACK, None, 0);
         for _ in 0..MOST_HITS {
-            tally.bounce += 1;
+            rays.bounce += 1;
             let Some(hit) = filler.rays.closest(&ray) else { break };
             // The next one may begin where this one is hit, but for rounding.
             ray.t_min = hit.t.max(ray.t_min.next_up());
@@ -114,11 +120,11 @@ impl NearField {
                 std::array::from_fn(|i| (Numbers(key).at(16 + found * 8 + i as u64) + line as f32 * STEPS[i]).fract());
             found += 1;
             if density > 0.0
-                && let Some((sample, shadow)) = filler.entering(at, 1.0 / density, u, tally)
+                && let Some((sample, shadow)) = filler.entering(at, 1.0 / density, u, rays)
             {
-                tally.shadow += u64::from(shadow.is_some());
+                rays.shadow += u64::from(shadow.is_some());
                 if !shadow.is_some_and(|ray| filler.rays.occluded(&ray)) {
-                    sum += filler.model.visit(Share { near: self, model: filler.model, sample: &sample, exit });
+                    sum += filler.model.visit(Share { near: self, model: filler.model, sample: &sample, exit, gather });
                 }
             }
         }
@@ -170,6 +176,7 @@ struct Share<'a> {
     model: &'a Model,
     sample: &'a CachedSample,
     exit: &'a Exit,
+    gather: &'a mut GatherTally,
 }
 
 impl ModelVisitor for Share<'_> {
@@ -180,6 +187,9 @@ impl ModelVisitor for Share<'_> {
         if near == 0.0 {
             return Rgb::BLACK;
         }
-        model.eval_cached(entry, *depth, self.exit, 0.0) * *flux * near
+        let s = model.eval_cached(entry, *depth, self.exit, 0.0);
+        self.gather.near += 1;
+        self.gather.clamped += (0..3).filter(|&c| model.clamps() && s[c] == 0.0 && flux[c] > 0.0).count() as u64;
+        s * *flux * near
     }
 }

@@ -28,6 +28,7 @@ impl Thinning {
 /// the next one that passes this bound is found by one geometric jump, and then kept with what is left of its own.
 pub fn thinned<B: Bssrdf>(thinning: &Thinning, model: &B, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
     let decay = model.decay();
+    let clamps = model.clamps();
     let (mut sum, mut numbers) = ([0.0_f64; 3], Numbers { key, next: 0 });
     let mut at = 0;
     while let Some(node) = thinning.tree.nodes.get(at) {
@@ -49,10 +50,9 @@ pub fn thinned<B: Bssrdf>(thinning: &Thinning, model: &B, exit: &Exit, key: u64,
             if numbers.uniform() * f64::from(bound) < f64::from(chance) {
                 tally.evaluated += 1;
                 let s = model.eval_cached(&sample.entry, sample.depth, exit, decay);
-                tally.count_clamped(model.clamps(), s, sample.flux);
-                let light = s * sample.flux;
                 for c in 0..3 {
-                    sum[c] += f64::from(light[c]);
+                    tally.clamped += u64::from(clamps && s[c] == 0.0 && sample.flux[c] > 0.0);
+                    sum[c] += f64::from(s[c] * sample.flux[c]);
                 }
             }
             i = (i + 1).saturating_add(numbers.jump(bound));

@@ -1,6 +1,6 @@
 //! `marmor merge`: parts of one render become one.
 
-use super::outputs::{Outputs, progress};
+use super::outputs::{LayerName, Outputs, progress};
 use marmor::film::{Checkpoint, check_writable};
 use marmor::{Error, Result};
 use std::path::PathBuf;
@@ -15,6 +15,9 @@ pub struct Args {
     /// Where to write; the ending .exr, .png or .film decides the format; may be given more than once
     #[arg(short, long, required = true, value_name = "FILE")]
     output: Vec<PathBuf>,
+    /// Further layers in the EXR, separated by commas: variance
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    layers: Vec<LayerName>,
     /// Brighten or darken the PNG by this many stops [default: as the first part would]
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
     exposure: Option<f64>,
@@ -46,7 +49,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         return Err(Error::usage("the parts have no passes: there is no picture"));
     }
     let exposure = args.exposure.unwrap_or(exposure);
-    let outputs = Outputs { paths: args.output, identity, attributes, exposure };
+    let outputs = Outputs { paths: args.output, identity, attributes, exposure, layers: args.layers };
     let said = outputs.save(&film, &spent)?;
     if !args.quiet {
         said.iter().for_each(|line| eprintln!("{line}"));

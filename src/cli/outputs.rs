@@ -1,13 +1,30 @@
 //! What becomes of a film: pictures, and film files to go on with.
 
 use super::setup::Prepared;
-use marmor::Result;
 use marmor::film::{
-    Attribute, Checkpoint, Film, Format, Identity, Metadata, PngOptions, Window, save, source_date_epoch,
+    Attribute, Checkpoint, Film, Format, Identity, Layer, Metadata, PngOptions, Window, save_with_layers,
+    source_date_epoch, variance,
 };
 use marmor::render::Spent;
+use marmor::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
+
+/// What an EXR may hold beside the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum LayerName {
+    /// Variance of each pixel's mean
+    Variance,
+}
+
+/// The layers asked for, each once.
+fn layers(names: &[LayerName], film: &Film) -> Result<Vec<Layer>> {
+    if !names.contains(&LayerName::Variance) {
+        return Ok(Vec::new());
+    }
+    let image = variance(film).ok_or_else(|| Error::usage("--layers variance needs at least 2 samples per pixel"))?;
+    Ok(vec![Layer { name: "Variance".into(), image }])
+}
 
 /// Where a film goes, and what its files say of it.
 pub struct Outputs {
@@ -19,6 +36,8 @@ pub struct Outputs {
     pub attributes: Vec<(String, String)>,
     /// Stops for a PNG.
     pub exposure: f64,
+    /// What an EXR holds beside the picture.
+    pub layers: Vec<LayerName>,
 }
 
 impl Outputs {
@@ -33,7 +52,7 @@ impl Outputs {
         .map(|(key, value)| (key.to_string(), value))
         .into();
         attributes.extend(prepared.method_attributes().into_iter().map(|(key, value)| (key.to_string(), value)));
-        Self { paths, identity: identity(prepared, backend, window), attributes, exposure }
+        Self { paths, identity: identity(prepared, backend, window), attributes, exposure, layers: Vec::new() }
     }
 
     /// Writes every file, also those after one that fails. What a PNG could not hold is in the lines returned.
@@ -47,12 +66,13 @@ impl Outputs {
             created: source_date_epoch(),
             attributes: self.all_attributes(film, spent),
         };
-        let image = film.image();
+        let (image, layers) = (film.image(), layers(&self.layers, film)?);
         let (mut said, mut failed) = (Vec::new(), None);
         for path in &self.paths {
             let saved = match Format::of(path)? {
                 Format::Film => self.save_film(path, film, spent).map(|()| None),
-                _ => save(&image, path, &metadata, PngOptions { exposure: self.exposure }).map(|report| report.png),
+                _ => save_with_layers(&image, &layers, path, &metadata, PngOptions { exposure: self.exposure })
+                    .map(|report| report.png),
             };
             match saved {
                 Ok(Some(png)) if png.above_one + png.below_zero + png.nan > 0 => said.push(format!(

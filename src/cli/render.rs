@@ -2,8 +2,8 @@
 
 use super::INTERRUPTED;
 use super::keep::{KeepArgs, Keeper, cancel_on_signals};
-use super::observers::{ProgressDisplay, Records, Verbosity, error_figures};
-use super::outputs::Outputs;
+use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
+use super::outputs::{LayerName, Outputs};
 use super::replay;
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
@@ -41,12 +41,18 @@ pub struct Args {
     /// Stop after this time of rendering, such as 30s, 5m or 500ms
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<Duration>,
+    /// Stop when the estimated relMSE is down to this, such as 1e-3
+    #[arg(long, value_name = "E", value_parser = positive)]
+    target_error: Option<f64>,
     /// Threads [default: one for each core]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Render these pixels only: x0,y0,x1,y1, the last two exclusive
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = window)]
     crop: Option<Window>,
+    /// Further layers in the EXR, separated by commas: variance
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    layers: Vec<LayerName>,
     /// Brighten or darken the PNG by this many stops [default: the scene's, else 0]
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
     exposure: Option<f64>,
@@ -125,7 +131,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             passes: match &args.keep.samples_range {
                 Some(range) => Some(range.end),
                 None => Some(args.spp.or(prepared.file.render.spp).unwrap_or(DEFAULT_SPP))
-                    .filter(|_| args.spp.is_some() || args.time.is_none()),
+                    .filter(|_| args.spp.is_some() || args.time.is_none() && args.target_error.is_none()),
             },
             time: args.time,
             cancel: &cancel,
@@ -134,7 +140,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
             return replay::run(&prepared, view, &job, pixel, args.pass);
         }
         let exposure = args.exposure.or(prepared.file.render.exposure).unwrap_or(0.0);
-        let outputs = Outputs::new(&prepared, &rays.description(), window, outputs, exposure);
+        let mut outputs = Outputs::new(&prepared, &rays.description(), window, outputs, exposure);
+        outputs.layers.clone_from(&args.layers);
         let (mut film, spent, mut keeper) = args.keep.start(&outputs, resolution, window, job.passes)?;
         if film.passes() > 0 && verbosity > Verbosity::Quiet {
             eprintln!("going on from {} after {} passes", keeper.path.display(), film.passes());
@@ -146,6 +153,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             reference,
             description: rays.description(),
             effective: prepared.file.effective(),
+            own: OwnError::default(),
         };
         if verbosity > Verbosity::Quiet {
             let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles.len()).sum();
@@ -193,6 +201,7 @@ struct Task<'a> {
     reference: Option<Image>,
     description: String,
     effective: String,
+    own: OwnError,
 }
 
 impl Task<'_> {
@@ -212,15 +221,17 @@ impl Task<'_> {
             }
         }
         let seconds_setup = self.begin.elapsed().as_secs_f64();
-        let mut display = ProgressDisplay::new(self.verbosity);
+        let (target, each_pass) = (self.args.target_error, self.args.records.is_some());
+        let mut measure = Measure::new(self.own.clone(), each_pass, target);
+        let mut display = ProgressDisplay::new(self.verbosity, self.own.clone(), target);
         let mut records = match &self.args.records {
             Some(path) => {
                 let file = RecordFile::go_on(path, film.passes())?;
-                Some(Records { file, seconds_setup, reference: self.reference.clone() })
+                Some(Records { file, seconds_setup, reference: self.reference.clone(), own: self.own.clone() })
             }
             None => None,
         };
-        let mut observers: Vec<&mut dyn Observer> = vec![&mut display];
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut measure, &mut display];
         if let Some(records) = &mut records {
             observers.push(records);
         }
@@ -265,9 +276,15 @@ impl Task<'_> {
             match outcome.stop {
                 Stop::Passes => "",
                 Stop::Time => "; stopped by --time",
+                Stop::Satisfied => "; reached --target-error",
                 Stop::Cancelled => "; interrupted",
             }
         );
+        if let Some(own) = self.own.relmse() {
+            let interval =
+                own.interval.map_or(String::new(), |[low, high]| format!(" (95 %: {low:.2e} to {high:.2e})"));
+            eprintln!("estimated relMSE {:.2e}{interval}", own.value);
+        }
         if let Some(reference) = &self.reference {
             let e = error_figures(&film.image(), reference)?;
             let relative = e.relmse.map_or(String::new(), |value| format!(", relMSE {value:.4e}"));
@@ -353,6 +370,14 @@ pub fn duration(text: &str) -> std::result::Result<Duration, String> {
     match number.trim().parse::<f64>() {
         Ok(n) if n > 0.0 && n * factor < 1e9 => Ok(Duration::from_secs_f64(n * factor)),
         _ => Err("expected a time above 0 such as 30s, 5m or 500ms".into()),
+    }
+}
+
+/// A number above 0.
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(n) if n > 0.0 && n.is_finite() => Ok(n),
+        _ => Err("expected a number above 0 such as 1e-3".into()),
     }
 }
 

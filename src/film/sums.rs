@@ -368,6 +368,13 @@ impl Film {
         Ok(())
     }
 
+    /// Passes in the even and in the odd half.
+    pub fn half_passes(&self) -> [u32; 2] {
+        let even = |r: &Range<u32>| r.end.div_ceil(2) - r.start.div_ceil(2);
+        let even = self.ranges.iter().map(even).sum();
+        [even, self.passes() - even]
+    }
+
     /// What was odd about the samples so far.
     pub fn counts(&self) -> Counts {
         self.counts

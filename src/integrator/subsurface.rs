@@ -14,7 +14,7 @@ use crate::math::{Rgb, Vec3, hash_combine};
 use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
-use crate::sampling::{CacheStream, PixelStream, Points};
+use crate::sampling::{CacheStream, PixelStream, Points, Turn};
 use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface};
 use std::sync::OnceLock;
 
@@ -82,7 +82,8 @@ struct Body {
     model: Model,
     envelope: Envelope,
     table: AreaTable,
-    stream: CacheStream,
+    /// Of even passes and of odd ones.
+    streams: [CacheStream; Turn::STREAMS],
     cosine_share: f32,
 }
 
@@ -102,11 +103,12 @@ impl Subsurface {
         let body = |(index, object): (usize, &crate::scene::Object)| {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
-            let stream = CacheStream::new(options.points, options.seed, index as u64);
+            let stream = |seed| CacheStream::new(options.points, seed, index as u64);
             let model = t.build()?;
             let envelope = Envelope::new(&model, &t.medium);
+            let streams = Turn::seeds(options.seed).map(stream);
             let cosine_share = object.mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds));
-            Ok(Some(Body { medium: t.medium, model, envelope, table, stream, cosine_share }))
+            Ok(Some(Body { medium: t.medium, model, envelope, table, streams, cosine_share }))
         };
         let bodies = scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?;
         Ok(Self {
@@ -119,7 +121,14 @@ impl Subsurface {
     }
 
     /// What fills the cache of object number `object`.
-    fn filler<'a>(&'a self, view: View<'a>, object: usize, body: &'a Body, density: &'a Density) -> Filler<'a> {
+    fn filler<'a>(
+        &'a self,
+        view: View<'a>,
+        object: usize,
+        body: &'a Body,
+        stream: &'a CacheStream,
+        density: &'a Density,
+    ) -> Filler<'a> {
         Filler {
             scene: view.scene,
             rays: view.rays,
@@ -130,7 +139,7 @@ impl Subsurface {
             eta: body.medium.eta,
             sampling: self.options.entry,
             cosine_share: body.cosine_share,
-            stream: &body.stream,
+            stream,
             density,
         }
     }
@@ -147,7 +156,7 @@ impl Subsurface {
                 return Plan { survey: Survey::none(), near: None };
             };
             let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
-            let filler = Filler { stream: &stream, ..self.filler(view, object, body, &even) };
+            let filler = self.filler(view, object, body, &stream, &even);
             let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread);
             Plan { survey, near: self.near(body) }
         };
@@ -201,9 +210,14 @@ impl Subsurface {
             gatherer.gather((&body.model, &body.envelope), &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
             let plan = self.plans.get().map(|plans| &plans[group[0].0]);
             if let Some(Plan { survey, near: Some(near) }) = plan {
-                let filler = self.filler(view, group[0].0, body, &survey.density);
+                let filler = self.filler(view, group[0].0, body, &body.streams[0], &survey.density);
                 for ((exit, &key), sum) in exits.iter().zip(&keys).zip(&mut found) {
-                    *sum += near.estimate(&filler, exit, hash_combine(key, 0x6e65_6172), &mut tally.rays);
+                    *sum += near.estimate(
+                        &filler,
+                        exit,
+                        hash_combine(key, 0x6e65_6172),
+                        (&mut tally.rays, &mut tally.gather),
+                    );
                 }
             }
             for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
@@ -266,11 +280,13 @@ impl Integrator for Subsurface {
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
         let plans = self.plans.get_or_init(|| self.plans(view));
+        let turn = Turn::of(self.options.seed, pass);
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
-            let filler = self.filler(view, object, body, &plans[object].survey.density);
+            let density = &plans[object].survey.density;
+            let filler = self.filler(view, object, body, &body.streams[turn.stream], density);
             let count = self.options.cache_samples;
-            let mut cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let mut cache = filler.fill(u64::from(turn.number) * u64::from(count), count, &mut tally.rays);
             let all = cache.lit.len();
             cache.lit.retain(CachedSample::is_finite);
             tally.gather.non_finite += (all - cache.lit.len()) as u64;

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::{Film, Window};
 use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
-use crate::sampling::PixelStream;
+use crate::sampling::{PixelStream, Turn};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -61,6 +61,11 @@ pub trait Observer {
     /// # Errors
     /// Whatever the observer cannot do, such as writing a record.
     fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()>;
+
+    /// True once the render is as good as this observer wants it; asked after each pass.
+    fn satisfied(&self) -> bool {
+        false
+    }
 }
 
 /// Why a render ended.
@@ -70,6 +75,8 @@ pub enum Stop {
     Passes,
     /// Time is up.
     Time,
+    /// An observer is satisfied, such as one that waits for an error to be reached.
+    Satisfied,
     /// Somebody set [`Job::cancel`].
     Cancelled,
 }
@@ -138,6 +145,7 @@ pub fn resume<I: Integrator>(
             Some(passes) if film.next_pass() >= passes => Stop::Passes,
             _ if film.passes() >= Film::MOST_PASSES => Stop::Passes,
             _ if job.time.is_some_and(|limit| outcome.seconds.total() >= limit.as_secs_f64()) => Stop::Time,
+            _ if observers.iter().any(|o| o.satisfied()) => Stop::Satisfied,
             _ if job.cancel.load(Ordering::Relaxed) && film.passes() > 0 => Stop::Cancelled,
             _ => {
                 if !render_pass(integrator, view, job, film, &tiles, &mut outcome) {
@@ -215,11 +223,12 @@ fn render_tile<I: Integrator>(
 ) -> (Vec<Rgb>, Tally) {
     let camera = &view.scene.camera;
     let width = u64::from(camera.resolution[0]);
+    let turn = Turn::of(job.seed, pass);
     let whole = if integrator.shares_tiles() { whole_tile(tile, camera.resolution) } else { tile };
     let mut rays = Vec::with_capacity(whole.area());
     for y in whole.y0..whole.y1 {
         for x in whole.x0..whole.x1 {
-            let mut stream = PixelStream::new(job.seed, u64::from(y) * width + u64::from(x), pass);
+            let mut stream = PixelStream::new(turn.seed, u64::from(y) * width + u64::from(x), turn.number);
             let ray = camera.ray([x, y], stream.next_2d());
             rays.push(CameraRay { ray, stream });
         }

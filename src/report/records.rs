@@ -2,7 +2,7 @@
 
 use crate::cache::GatherTally;
 use crate::error::{Error, Result};
-use crate::film::Counts;
+use crate::film::{Counts, SelfErrors};
 use crate::query::RayTally;
 use serde::Serialize;
 use std::fs::File;
@@ -32,6 +32,9 @@ pub struct Record {
     /// Distance to the reference; absent without one.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorFigures>,
+    /// Distance to what the picture converges to, told by its halves; absent before two passes.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub own: Option<SelfFigures>,
     /// Samples left out because they are not numbers.
     pub non_finite: u64,
     /// Values of S_d below zero that were taken as 0; samples are never clamped.
@@ -49,6 +52,27 @@ pub struct ErrorFigures {
     pub relmse: Option<f64>,
     /// 95 % interval of `relmse`; `null` where the picture is too small to tell.
     pub interval: Option<[f64; 2]>,
+}
+
+/// The same figures without a reference.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SelfFigures {
+    /// Root of the mean squared distance to the limit.
+    pub self_rmse: f64,
+    /// relMSE; `null` if the picture is black.
+    pub self_relmse: Option<f64>,
+    /// 95 % interval of `self_relmse`; `null` before four passes.
+    pub self_interval: Option<[f64; 2]>,
+}
+
+impl From<&SelfErrors> for SelfFigures {
+    fn from(errors: &SelfErrors) -> Self {
+        Self {
+            self_rmse: errors.rmse.value,
+            self_relmse: errors.relmse.map(|e| e.value),
+            self_interval: errors.relmse.and_then(|e| e.interval),
+        }
+    }
 }
 
 impl Record {

@@ -3,8 +3,10 @@
 
 mod cache_stream;
 mod stream;
+mod turn;
 mod warp;
 
 pub use cache_stream::{CacheStream, Points};
 pub use stream::PixelStream;
+pub use turn::Turn;
 pub use warp::{cosine_hemisphere, disk};
