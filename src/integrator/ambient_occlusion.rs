@@ -1,9 +1,9 @@
 //! The share of the cosine-weighted hemisphere that is open.
 
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::math::Rgb;
+use crate::math::{Frame, Rgb};
 use crate::query::Ray;
-use crate::sampling::cosine_hemisphere;
+use crate::sampling::Pairs;
 use crate::scene::Scene;
 
 /// Occlusion rays that go to the backend together, unless one camera ray has more: some MB a thread.
@@ -27,19 +27,23 @@ impl Integrator for AmbientOcclusion {
 
         let per_hit = self.rays as usize;
         let together = (MOST_PROBES / per_hit).max(1);
-        let (mut probes, mut occluded) = (Vec::new(), Vec::new());
         for ((rays, hits), out) in rays.chunks(together).zip(hits.chunks(together)).zip(out.chunks_mut(together)) {
-            probes.clear();
+            let mut pairs = Pairs::with_capacity(rays.len() * per_hit);
+            let mut points = Vec::with_capacity(rays.len());
             for (ray, hit) in rays.iter().zip(hits) {
                 let Some(hit) = hit else { continue };
-                let at = view.point(hit, ray.ray.direction);
-                for part in 0..self.rays {
-                    let w = cosine_hemisphere(at.n, ray.stream.split(part, self.rays).next_2d());
-                    probes.push(Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) });
-                }
+                points.push(view.point(hit, ray.ray.direction));
+                pairs.push_splits(&ray.stream, self.rays);
             }
-            occluded.clear();
-            occluded.resize(probes.len(), false);
+            let mut probes = Vec::with_capacity(points.len() * per_hit);
+            for (at, local) in points.iter().zip(pairs.cosine_hemisphere().chunks_exact(per_hit)) {
+                let frame = Frame::about(at.n);
+                probes.extend(local.iter().map(|&w| {
+                    let w = frame.to_world(w);
+                    Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) }
+                }));
+            }
+            let mut occluded = vec![false; probes.len()];
             view.rays.occluded_batch(&probes, &mut occluded);
             tally.rays.shadow += probes.len() as u64;
 

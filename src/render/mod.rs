@@ -225,25 +225,40 @@ fn render_tile<I: Integrator>(
     let width = u64::from(camera.resolution[0]);
     let turn = Turn::of(job.seed, pass);
     let whole = if integrator.shares_tiles() { whole_tile(tile, camera.resolution) } else { tile };
-    let mut rays = Vec::with_capacity(whole.area());
-    for y in whole.y0..whole.y1 {
-        for x in whole.x0..whole.x1 {
+    let pixels = pixels(whole);
+    let rays: Vec<CameraRay> = pixels
+        .iter()
+        .map(|&[x, y]| {
             let mut stream = PixelStream::new(turn.seed, u64::from(y) * width + u64::from(x), turn.number);
             let ray = camera.ray([x, y], stream.next_2d());
-            rays.push(CameraRay { ray, stream });
-        }
-    }
+            CameraRay { ray, stream }
+        })
+        .collect();
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);
-    if whole != tile {
-        let kept = |i: usize| {
-            let width = whole.width();
-            let (x, y) = (whole.x0 + (i % width) as u32, whole.y0 + (i / width) as u32);
-            (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y)
-        };
-        out = out.into_iter().enumerate().filter(|&(i, _)| kept(i)).map(|(_, sample)| sample).collect();
+    // Back into rows; of a whole tile only the part in the window.
+    let mut by_row = vec![Rgb::BLACK; tile.area()];
+    for ([x, y], radiance) in pixels.into_iter().zip(out) {
+        if (tile.x0..tile.x1).contains(&x) && (tile.y0..tile.y1).contains(&y) {
+            by_row[((y - tile.y0) * (tile.x1 - tile.x0) + x - tile.x0) as usize] = radiance;
+        }
     }
-    (out, tally)
+    (by_row, tally)
+}
+
+/// The pixels of a tile in squares of eight by eight: neighbours in the list are neighbours in the picture, so that their
+/// rays go well together.
+fn pixels(tile: Window) -> Vec<[u32; 2]> {
+    const SQUARE: usize = 8;
+    let mut pixels = Vec::with_capacity(tile.area());
+    for y0 in (tile.y0..tile.y1).step_by(SQUARE) {
+        for x0 in (tile.x0..tile.x1).step_by(SQUARE) {
+            for y in y0..tile.y1.min(y0 + SQUARE as u32) {
+                pixels.extend((x0..tile.x1.min(x0 + SQUARE as u32)).map(|x| [x, y]));
+            }
+        }
+    }
+    pixels
 }
 
 /// The tile of the whole picture that `tile` of a crop lies in.
@@ -259,4 +274,19 @@ fn tiles(window: Window) -> Vec<Window> {
     };
     let row = |(y0, y1)| cuts(window.x0, window.x1).map(move |(x0, x1)| Window { x0, y0, x1, y1 });
     cuts(window.y0, window.y1).flat_map(row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_pixel_of_a_tile_is_listed_once() {
+        let tile = Window { x0: 3, y0: 8, x1: 24, y1: 19 };
+        let mut listed = pixels(tile);
+        assert_eq!((listed[0], listed[8]), ([3, 8], [3, 9]));
+        listed.sort_by_key(|&[x, y]| (y, x));
+        let rows: Vec<[u32; 2]> = (8..19).flat_map(|y| (3..24).map(move |x| [x, y])).collect();
+        assert_eq!(listed, rows);
+    }
 }
