@@ -10,7 +10,8 @@ use std::process::Command;
 fn every_licence_is_listed() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let tree = ["tree", "--offline", "--locked", "--features", "embree", "-e", "normal,build", "--prefix", "none"];
-    let output = Command::new(env!("CARGO")).current_dir(root).args(tree).args(["--format", "{l}|{p}"]).output().unwrap();
+    let output =
+        Command::new(env!("CARGO")).current_dir(root).args(tree).args(["--format", "{l}|{p}"]).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let found: BTreeSet<String> = String::from_utf8(output.stdout)
         .unwrap()
