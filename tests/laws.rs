@@ -163,6 +163,15 @@ fn film<I: Integrator>(method: &I, scene: &Scene, backend: Backend, passes: Rang
     (film, outcome.tally)
 }
 
+/// With more samples than are summed without a tree, where there is one.
+const ESTIMATORS: [(Estimator, u32); 5] = [
+    (Estimator::Cut, 1500),
+    (Estimator::All, 100),
+    (Estimator::Notes, 100),
+    (Estimator::Thinned, 1500),
+    (Estimator::Cluster, 1500),
+];
+
 fn set_model(scene: &mut Scene, model: ModelName) {
     for material in &mut scene.materials {
         if let Surface::Translucent(t) = &mut material.surface {
@@ -183,19 +192,13 @@ fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -
         all.push((name.to_string(), film(&method, scene, backend, passes.clone()).0));
     }
     all.push(("direct".into(), film(&Direct::new(scene, 2).unwrap(), scene, backend, passes.clone()).0));
-    for model in ModelName::ALL {
+    // Every model with one estimator, every estimator with one model.
+    let pairs = ModelName::ALL.into_iter().enumerate().map(|(i, model)| (model, ESTIMATORS[i % ESTIMATORS.len()]));
+    for (model, (estimator, samples)) in pairs.chain(ESTIMATORS.map(|e| (ModelName::Better, e))) {
         set_model(scene, model);
-        for (estimator, samples) in [
-            (Estimator::Cut, 1500),
-            (Estimator::All, 100),
-            (Estimator::Notes, 100),
-            (Estimator::Thinned, 1500),
-            (Estimator::Cluster, 1500),
-        ] {
-            let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
-            let name = format!("{}, {}", model.name(), estimator.name());
-            all.push((name, film(&method, scene, backend, passes.clone()).0));
-        }
+        let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
+        let name = format!("{}, {}", model.name(), estimator.name());
+        all.push((name, film(&method, scene, backend, passes.clone()).0));
     }
     all
 }
@@ -224,7 +227,7 @@ fn law_1_scale_powers_of_two_change_no_bit() {
     for backend in backends() {
         let plain = scenes(1.0, [0.0; 3]);
         let plain: Vec<_> = plain.into_iter().map(|(name, mut s)| (name, films(&mut s, backend, 0..1, 0.5))).collect();
-        for exponent in [-20, 1, 20] {
+        for exponent in [-20, 20] {
             let k = 2_f64.powi(exponent);
             for ((name, mut scene), (_, expected)) in scenes(k, [0.0; 3]).into_iter().zip(&plain) {
                 let found = films(&mut scene, backend, 0..1, 0.5 * k);
