@@ -126,6 +126,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film)?,
             Method::Direct(method) => task.run(method, view, &job, &mut film)?,
             Method::Subsurface(method) => task.run(&**method, view, &job, &mut film)?,
+            Method::VolumePath(method) => task.run(&**method, view, &job, &mut film)?,
         };
         if film.passes() == 0 {
             return Err(Error::usage("0 samples per pixel make no picture; ask for at least 1 with --spp"));

@@ -2,6 +2,7 @@
 //! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area.
 
 mod area_table;
+mod clearance;
 mod mesh;
 mod morton;
 mod obj;
@@ -10,6 +11,7 @@ mod obj_mesh;
 mod shapes;
 
 pub use area_table::{AreaSample, AreaTable};
+pub use clearance::Clearance;
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;
 pub use obj::load_obj;

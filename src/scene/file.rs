@@ -231,6 +231,8 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         "model",
         "entry",
         "specular",
+        "orders",
+        "photons",
     ];
     m.only("[method]", &keys)?;
     Ok(MethodOptions {
@@ -245,6 +247,10 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         model: named_value(&m, "model")?,
         entry: named_value(&m, "entry")?,
         specular: switch(&m, "specular")?,
+        orders: named_value(&m, "orders")?,
+        photons: m.get("photons", "a whole number from 0 to 16777216", |n| {
+            n.integer().filter(|i| (0..=1 << 24).contains(i)).map(|i| i as u32)
+        })?,
     })
 }
 

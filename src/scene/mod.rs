@@ -17,5 +17,7 @@ pub use camera::Camera;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
-pub use options::{DEFAULT_CUT_ERROR, EntrySampling, Estimator, MethodName, MethodOptions, RenderOptions};
+pub use options::{
+    DEFAULT_CUT_ERROR, DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions,
+};
 pub use world::{Material, Object, Scene, Surface, Translucent};

@@ -47,7 +47,22 @@ named! {
     /// Light of area lights on diffuse surfaces.
     Direct = "direct",
     /// Light through translucent materials.
-    Subsurface = "subsurface"
+    Subsurface = "subsurface",
+    /// Paths traced through the media themselves.
+    VolumePath = "volume_path"
+}
+
+named! {
+    /// How often light may have been scattered in media.
+    Orders, "range of scattering orders",
+    /// Any number of times.
+    All = "all",
+    /// Never.
+    None = "0",
+    /// Once.
+    Single = "1",
+    /// Twice or more.
+    Multiple = "2+"
 }
 
 named! {
@@ -72,6 +87,9 @@ impl Estimator {
         }
     }
 }
+
+/// [`MethodOptions::photons`] unless the scene says.
+pub const DEFAULT_PHOTONS: u32 = 16384;
 
 /// [`MethodOptions::cut_error`] unless the scene says.
 pub const DEFAULT_CUT_ERROR: f32 = 0.3;
@@ -106,7 +124,11 @@ pub struct MethodOptions {
     pub model: Option<ModelName>,
     /// Subsurface: how light is sampled where it enters; by the scene if absent.
     pub entry: Option<EntrySampling>,
-    /// Subsurface: add the mirror reflection at the boundary.
+    /// Volume path: the scattering orders that are wanted.
+    pub orders: Option<Orders>,
+    /// Volume path: photons per pass and translucent object, 0 to 2^24.
+    pub photons: Option<u32>,
+    /// Subsurface and volume path: add the mirror reflection at the boundary.
     pub specular: Option<bool>,
 }
 
