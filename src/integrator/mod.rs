@@ -16,7 +16,7 @@ use crate::scene::Scene;
 pub use ambient_occlusion::AmbientOcclusion;
 pub use direct::Direct;
 pub use subsurface::{Subsurface, SubsurfaceOptions};
-pub use volume_path::{VolumePath, VolumePathOptions};
+pub use volume_path::{Left, VolumePath, VolumePathOptions};
 
 /// The scene and the backend that was built for it.
 #[derive(Clone, Copy)]

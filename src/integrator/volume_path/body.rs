@@ -1,5 +1,6 @@
 //! A translucent object from the inside: flights, collisions, the boundary, until light leaves.
 
+use super::aim::Aim;
 use super::draws::Draws;
 use super::spectrum::{Coefficients, Spectrum};
 use crate::geometry::{Clearance, SurfacePoint};
@@ -24,6 +25,8 @@ pub struct Body {
     pub clearance: Clearance,
     /// Smallest extinction of the channels with any [1/unit]; 0 without a medium.
     pub least_extinction: f32,
+    /// Lamps to aim at.
+    pub aims: Vec<Aim>,
     /// Collisions between two looks at the weight.
     patience: u32,
 }
@@ -50,6 +53,8 @@ pub struct Exit {
     pub at: SurfacePoint,
     /// Refracted direction outside.
     pub w: Vec3,
+    /// Whether it came there straight from a collision.
+    pub straight: bool,
 }
 
 /// Surface events in a row after which a path goes on by chance, lest it circle for ever without absorption.
@@ -59,18 +64,21 @@ const BOUNCE_SURVIVAL: f32 = 0.9;
 /// A path that has lost more than this part of its weight goes on by chance.
 const ROULETTE_BELOW: f32 = 0.25;
 
-/// What ends a flight.
-enum End {
+/// What ends a flight, and after which length.
+pub enum Flight {
+    /// Its own length.
     Collision(Vec3),
+    /// The body's own boundary from inside, normals outwards.
     Boundary(SurfacePoint, f32),
     /// An opaque surface inside, with its albedo.
     Opaque(SurfacePoint, f32, Rgb),
+    /// A hole of the mesh, the wrong side of a face, or another medium.
     Lost,
 }
 
 impl Body {
     /// The object number `object`, with a table of the surfaces in its box.
-    pub fn new(object: u32, medium: &Medium, clearance: Clearance) -> Self {
+    pub fn new(object: u32, medium: &Medium, clearance: Clearance, aims: Vec<Aim>) -> Self {
         let coefficients = Coefficients::new(medium);
         let absorbed = 1.0 - coefficients.albedo.max();
         let extinctions = coefficients.sigma_t.0.into_iter().filter(|s| *s > 0.0);
@@ -83,6 +91,7 @@ impl Body {
             medium: coefficients,
             phase: HenyeyGreenstein { g: medium.g },
             clearance,
+            aims,
         }
     }
 
@@ -96,7 +105,7 @@ impl Body {
     }
 
     #[inline]
-    fn scatter(&self, w: Vec3, draws: &mut Draws) -> Vec3 {
+    pub fn scatter(&self, w: Vec3, draws: &mut Draws) -> Vec3 {
         if self.phase.g == 0.0 {
             return draws.direction();
         }
@@ -106,24 +115,24 @@ impl Body {
 
     /// From `from` along `w`, a collision at `distance` unless a surface comes first. No ray where the table is sure.
     #[inline]
-    fn flight(&self, view: View<'_>, from: Vec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> End {
+    pub fn flight(&self, view: View<'_>, from: Vec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Flight {
         if distance < self.clearance.at(from) {
             tally.clear += 1;
-            return End::Collision(from + w * distance);
+            return Flight::Collision(from + w * distance);
         }
         tally.rays += 1;
         let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
             let x = from + w * distance;
-            return if self.clearance.at(x) >= 0.0 { End::Collision(x) } else { End::Lost };
+            return if self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
         };
         let object = &view.scene.objects[hit.mesh as usize];
         let at = object.mesh.point(hit.triangle, hit.u, hit.v);
         if hit.mesh == self.object {
-            return if at.n_geometric.dot(w) > 0.0 { End::Boundary(at, hit.t) } else { End::Lost };
+            return if at.n_geometric.dot(w) > 0.0 { Flight::Boundary(at, hit.t) } else { Flight::Lost };
         }
         match &view.scene.materials[object.material].surface {
-            Surface::Diffuse { albedo } => End::Opaque(at.facing(-w), hit.t, *albedo),
-            Surface::Emissive { .. } | Surface::Translucent(_) => End::Lost,
+            Surface::Diffuse { albedo } => Flight::Opaque(at.facing(-w), hit.t, *albedo),
+            Surface::Emissive { .. } | Surface::Translucent(_) => Flight::Lost,
         }
     }
 
@@ -148,7 +157,7 @@ impl Body {
         loop {
             let distance = spectrum.distance(&self.medium, draws.number());
             match self.flight(view, from, w, distance, tally) {
-                End::Collision(x) => {
+                Flight::Collision(x) => {
                     tally.collisions += 1;
                     (collisions, bounces) = (collisions + 1, 0);
                     spectrum.collide(distance);
@@ -166,7 +175,7 @@ impl Body {
                     edge = Some(self.phase(w, next));
                     (from, w) = (x, next);
                 }
-                End::Boundary(at, t) => {
+                Flight::Boundary(at, t) => {
                     spectrum.fly(t);
                     let inwards = -at.n_geometric;
                     let mu = -w.dot(inwards);
@@ -174,12 +183,12 @@ impl Body {
                         && let Some(out) = refract(-w, inwards, 1.0 / self.eta)
                     {
                         spectrum.leave(&self.medium);
-                        return Some(Exit { at, w: out });
+                        return Some(Exit { at, w: out, straight: edge.is_some() });
                     }
                     w = reflect(-w, inwards);
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);
                 }
-                End::Opaque(at, t, albedo) => {
+                Flight::Opaque(at, t, albedo) => {
                     spectrum.fly(t);
                     spectrum.scale(albedo);
                     if albedo.is_black() || !survives(albedo.max(), spectrum, draws) {
@@ -188,7 +197,7 @@ impl Body {
                     w = cosine_hemisphere(at.n_geometric, draws.pair());
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);
                 }
-                End::Lost => {
+                Flight::Lost => {
                     tally.lost += 1;
                     return None;
                 }

@@ -1,6 +1,7 @@
 //! A path from the camera through the whole scene.
 
 use super::VolumePath;
+use super::aim::{Aim, aimed_light};
 use super::body::{Body, Edge, Watch, survives};
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
@@ -35,6 +36,8 @@ pub struct CameraPath<'a> {
     pub order: u32,
     /// Whether a lamp that is met counts: not where one was asked for at the last surface.
     pub meets_lamps: bool,
+    /// Lamps that were aimed at from the collision before, and do not count either.
+    pub aimed: &'a [Aim],
     pub radiance: Rgb,
 }
 
@@ -42,7 +45,7 @@ pub struct CameraPath<'a> {
 const PATIENT_BOUNCES: u32 = 16;
 const BOUNCE_SURVIVAL: f32 = 0.8;
 
-impl CameraPath<'_> {
+impl<'a> CameraPath<'a> {
     /// Adds light of the present order.
     fn add(&mut self, light: Rgb) {
         if self.method.options.orders.contains(self.order) {
@@ -76,9 +79,10 @@ impl CameraPath<'_> {
     /// What a surface adds, and the ray on which the path goes on.
     fn meet(&mut self, hit: &Hit, direction: Vec3) -> Option<Ray> {
         let at = self.view.point(hit, direction);
+        let aimed = std::mem::take(&mut self.aimed);
         match self.view.scene.surface(hit.mesh) {
             Surface::Emissive { .. } => {
-                if self.meets_lamps {
+                if self.meets_lamps && aimed.iter().all(|aim| aim.object != hit.mesh) {
                     self.add(self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * self.direct);
                 }
                 None
@@ -135,7 +139,7 @@ impl CameraPath<'_> {
     }
 
     /// Through a body from `at`, refracted into `w`; the ray on which the path leaves it.
-    pub fn inside(&mut self, body: &Body, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
+    pub fn inside(&mut self, body: &'a Body, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
         let (mut spectrum, mut draws) = (self.spectrum, self.draws.clone());
         let mut walks = WalkTally::default();
         let view = self.view;
@@ -145,6 +149,7 @@ impl CameraPath<'_> {
         self.tally.walk += walks;
         let exit = exit?;
         self.meets_lamps = true;
+        self.aimed = if exit.straight { &body.aims } else { &[] };
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
 }
@@ -162,32 +167,32 @@ impl Watch for Gather<'_, '_> {
         if path.method.options.orders.none_above(path.order) {
             return false;
         }
-        let (Some(source), Some(cells)) =
-            (&path.method.sources[body.object as usize], &path.photons[body.object as usize])
-        else {
-            return true;
-        };
-        if path.direct <= 0.0 {
-            return true;
-        }
-        if let Some(edge) = edge {
+        let photons =
+            path.method.sources[body.object as usize].as_ref().zip(path.photons[body.object as usize].as_ref());
+        if let (Some((source, _)), Some(edge), true) = (photons, edge, path.direct > 0.0) {
             let share = walked_share(source.yielding, source.reach, edge.length, edge.phase);
             if share < 1.0 && draws.number() >= share {
                 path.direct = 0.0;
                 if path.other > 0.0 && draws.number() < path.method.persistence {
                     path.other /= path.method.persistence;
-                    return true;
+                } else {
+                    path.other = 0.0;
                 }
-                path.other = 0.0;
-                return false;
             }
         }
-        let light =
-            connect(path.view, body, cells, source.yielding, x, w, path.scratch, &mut path.coins, &mut path.tally.walk);
-        // Radiance falls by η² on its way out.
-        let value = spectrum.value(&body.medium) * (path.direct / (body.eta * body.eta));
-        if path.method.options.orders.contains(path.order + 1) {
-            path.radiance += value * light;
+        if path.direct <= 0.0 {
+            return path.other > 0.0;
+        }
+        let orders = path.method.options.orders;
+        if !body.aims.is_empty() && orders.contains(path.order) {
+            let light = aimed_light(path.view, body, x, w, spectrum, &mut path.coins, &mut path.tally.walk);
+            path.radiance += light * path.direct;
+        }
+        if let (Some((source, cells)), true) = (photons, orders.contains(path.order + 1)) {
+            let (coins, tally) = (&mut path.coins, &mut path.tally.walk);
+            let light = connect(path.view, body, cells, source.yielding, x, w, path.scratch, coins, tally);
+            // Radiance falls by η² on its way out.
+            path.radiance += spectrum.value(&body.medium) * light * (path.direct / (body.eta * body.eta));
         }
         true
     }
@@ -215,7 +220,7 @@ impl Orders {
 }
 
 /// Both parts of what the camera sees on a body: the mirror image of what is around it, and the light from inside.
-pub fn both_parts(path: &mut CameraPath<'_>, body: &Body, hit: &Hit, direction: Vec3) {
+pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) {
     if !path.faces(hit, direction) {
         return;
     }

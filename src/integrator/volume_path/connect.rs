@@ -8,7 +8,7 @@ use crate::math::{Rgb, Vec3};
 use crate::query::Ray;
 
 /// Photons looked at from one point; of more, every second, third, ... is taken, with the weight of all.
-const MOST_LOOKED_AT: u32 = 192;
+const MOST_LOOKED_AT: u32 = 1024;
 
 /// Room for the work at one point.
 #[derive(Default)]

@@ -1,12 +1,14 @@
 //! Paths through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach.
 //! Read first: `camera.rs` (a path through the scene), `body.rs` (inside one object), then `connect.rs` (what makes it fast).
 
+mod aim;
 mod body;
 mod camera;
 mod cells;
 mod connect;
 mod draws;
 mod nested;
+mod pencil;
 mod photons;
 mod spectrum;
 
@@ -23,6 +25,7 @@ use camera::{CameraPath, both_parts};
 use cells::Cells;
 use connect::Scratch;
 use draws::Draws;
+pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
 
@@ -116,6 +119,7 @@ impl VolumePath {
             other: 1.0,
             order: 0,
             meets_lamps: true,
+            aimed: &[],
             radiance: Rgb::BLACK,
         };
         match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
@@ -137,7 +141,8 @@ fn body(scene: &Scene, index: usize) -> Option<Body> {
     let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
     let (lo, hi) = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
-    Some(Body::new(index as u32, &t.medium, Clearance::new(meshes, lo, hi, CLEARANCE_CELLS)))
+    let clearance = Clearance::new(meshes, lo, hi, CLEARANCE_CELLS);
+    Some(Body::new(index as u32, &t.medium, clearance, aim::aims(scene, index as u32)))
 }
 
 impl Integrator for VolumePath {

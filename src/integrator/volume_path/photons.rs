@@ -162,4 +162,4 @@ impl Watch for Deposit<'_> {
 /// The smallest chance of being kept.
 const LEAST_CHANCE: f32 = 0.02;
 /// Scales [`Source::yielding`]; found by measuring the error at equal time.
-const YIELD: f32 = 4.0;
+const YIELD: f32 = 256.0;
