@@ -5,7 +5,7 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use marmor::bssrdf::{
     Bssrdf, DirectionColumns, DirectionalDipole, Entry, EntryColumns, Exit, KappaExtinction, Model, ModelVisitor,
-    PhotonBeamDiffusion, SourceColumns,
+    Partition, PhotonBeamDiffusion, SourceColumns,
 };
 use marmor::math::{Level, Rgb, Vec3};
 use marmor::optics::Medium;
@@ -52,14 +52,22 @@ fn gathers(medium: &Medium, name: &str, r: &[f32]) {
     let (zero, one, slant) = (column(0.0), column(1.0), column(std::f32::consts::FRAC_1_SQRT_2));
     let down = column(-std::f32::consts::FRAC_1_SQRT_2);
     let directional = DirectionalDipole::new(medium, false);
-    let entries = EntryColumns { x: r, y: &zero, z: &zero, weight: [&one; 3] };
+    let entries = EntryColumns { x: r, y: &zero, z: &zero, weight: [&one; 3], partition: Partition::NONE };
     let directions = DirectionColumns { n: [&zero, &zero, &one], w: [&slant, &zero, &down] };
     let beam = PhotonBeamDiffusion::new(medium, true, KappaExtinction::default());
     let w = Vec3::new(slant[0], 0.0, down[0]);
     let t: Vec<f32> = (0..COUNT).map(|i| beam.sample_depth((i * 769 % COUNT) as f32 / COUNT as f32)).collect();
     let x: Vec<f32> = r.iter().zip(&t).map(|(r, t)| r + t * w.x).collect();
     let (z, below): (Vec<f32>, Vec<f32>) = t.iter().map(|t| (t * w.z, -t * w.z)).unzip();
-    let sources = SourceColumns { x: &x, y: &zero, z: &z, below: &below, travelled: &t, weight: [&one; 3] };
+    let sources = SourceColumns {
+        x: &x,
+        y: &zero,
+        z: &z,
+        below: &below,
+        travelled: &t,
+        weight: [&one; 3],
+        partition: Partition::NONE,
+    };
     let scalar = rate(|| {
         for (&r, &t) in black_box(r).iter().zip(&t) {
             let entry = Entry { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w };
@@ -114,7 +122,7 @@ fn table() {
             .map(|level| rate(|| radial.exitance_batch_at(level, 0, black_box(&r), black_box(&mut out))))
             .collect();
         let gathered = model.gather().map(|g| {
-            let entries = EntryColumns { x: &r, y: &zero, z: &zero, weight: [&one; 3] };
+            let entries = EntryColumns { x: &r, y: &zero, z: &zero, weight: [&one; 3], partition: Partition::NONE };
             rate(|| {
                 black_box(g.gather(black_box(Vec3::ZERO), entries));
             })

@@ -5,7 +5,7 @@
 //!
 //! A file's mesh is scaled to 100 mm; without a file the mesh is a closed sphere with bumps, 60 mm wide. The lines at the end tell, for each medium, model
 //! and number of samples M: time at an exit and noise against the sum over all samples, and the ratio to the lecture's
-//! loop, all estimators by turns in one run.
+//! loop, all estimators by turns in one run. Exits are the hits of a camera's tiles, as in a render.
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // a benchmark prints, and stops at what it cannot read
 
 use std::hint::black_box;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use marmor::bssrdf::{Exit, Model, ModelName};
-use marmor::cache::{Cache, Envelope, Filler, GatherTally, Gatherer, Scratch};
+use marmor::cache::{Cache, Density, Envelope, Filler, GatherTally, Gatherer, Scratch, Tuning};
 use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
 use marmor::math::{Rgb, hash};
@@ -22,10 +22,12 @@ use marmor::query::{self, Backend, RayQuery, RayTally};
 use marmor::sampling::{CacheStream, Points};
 use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile};
 
-/// Exits that noise is measured at.
-const EXITS: u64 = 64;
-/// Estimates at each of them.
-const DRAWS: u64 = 16;
+/// Edge of a tile of camera rays, as the renderer has them.
+const TILE: u32 = 32;
+/// Hits of a tile that the slow loops sum at.
+const FEW: usize = 6;
+/// Estimates at each hit.
+const DRAWS: u64 = 4;
 
 /// The mesh, in skim milk, under a lamp behind it.
 fn scene() -> (Scene, tempfile::TempDir) {
@@ -45,7 +47,7 @@ fn scene() -> (Scene, tempfile::TempDir) {
         }
     };
     let text = format!(
-        "unit = \"mm\"\n[camera]\nposition = [0, 0, 200]\nlook_at = [0, 0, 0]\nfov = 30\nresolution = [8, 8]\n\
+        "unit = \"mm\"\n[camera]\nposition = [0, 5, 320]\nlook_at = [0, 0, 0]\nfov = 22\nresolution = [512, 512]\n\
          [[object]]\nname = \"body\"\nmaterial = \"milk\"\n{object}\
          [[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [0, 150, -120]\nedge_u = [50, 0, 0]\n\
          edge_v = [0, 35, 35]\nmaterial = \"lamp\"\n\
@@ -105,20 +107,33 @@ impl Bench<'_> {
             table: self.table,
             eta: 1.3,
             sampling: EntrySampling::Light,
+            cosine_share: 0.0,
             stream: &stream,
+            density: &Density::even(),
         };
         filler.fill(0, count, &mut RayTally::default())
     }
 
-    fn exits(&self) -> Vec<Exit> {
-        let stream = CacheStream::new(Points::Sobol, 77, 0);
-        let exit = |i| {
-            let (pick, u) = stream.numbers(i);
-            let at = self.table.sample(pick, [u[0], u[1]]);
-            let p = self.scene.objects[0].mesh.point(at.triangle, at.u, at.v);
-            Exit { x: p.x, n: p.n_geometric, w: p.n_geometric }
+    /// Hits of some tiles of the picture, tile by tile.
+    fn tiles(&self) -> Vec<Vec<Exit>> {
+        let camera = &self.scene.camera;
+        let hit = |pixel: [u32; 2]| {
+            let ray = camera.ray(pixel, [0.5; 2]);
+            let hit = self.rays.closest(&ray).filter(|h| h.mesh == 0)?;
+            let p = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.direction);
+            Some(Exit { x: p.x, n: p.n_geometric, w: -ray.direction })
         };
-        (0..EXITS).map(exit).collect()
+        let mut tiles = Vec::new();
+        for y in (0..camera.resolution[1] / TILE).step_by(3) {
+            for x in (0..camera.resolution[0] / TILE).step_by(3) {
+                let pixels = (0..TILE * TILE).map(|i| [x * TILE + i % TILE, y * TILE + i / TILE]);
+                let exits: Vec<Exit> = pixels.filter_map(hit).collect();
+                if exits.len() > FEW {
+                    tiles.push(exits);
+                }
+            }
+        }
+        tiles
     }
 }
 
@@ -152,44 +167,56 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         tally: GatherTally::default(),
     };
     for error in [0.003, 0.01, 0.03, 0.1] {
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, error);
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(error));
         entrants.push(entrant(format!("cut {error}"), gatherer));
     }
     let built = start.elapsed().as_secs_f64() / 4.0;
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &model, 0.0);
+        let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(0.1));
         entrants.push(entrant(estimator.name().to_string(), gatherer));
     }
-    let exits = bench.exits();
+    let tiles = bench.tiles();
+    let few = |tile: &Vec<Exit>| -> Vec<Exit> { tile.iter().step_by(tile.len() / FEW).copied().take(FEW).collect() };
     let mut scratch = Scratch::default();
-    let exact: Vec<Rgb> = {
+    let mut out = Vec::new();
+    let exact: Vec<Vec<Rgb>> = {
         let all = &entrants.last().unwrap().gatherer;
         let mut tally = GatherTally::default();
-        exits.iter().map(|e| all.gather(&model, &envelope, e, 0, &mut scratch, &mut tally)).collect()
+        let mut sum = |tile: &Vec<Exit>| {
+            let mut out = Vec::new();
+            let exits = few(tile);
+            all.gather((&model, &envelope), &exits, &vec![0; exits.len()], &mut scratch, &mut tally, &mut out);
+            out
+        };
+        tiles.iter().map(&mut sum).collect()
     };
     let slow = count > 200_000;
     for round in 0..if slow { 1 } else { 3 } {
         for e in &mut entrants {
             let plain = !e.name.starts_with("cut");
-            let draws = if plain { if slow { 1 } else { 2 } } else { DRAWS };
-            let mut squares = [0.0; 3];
+            let draws = if plain { 1 } else { DRAWS };
+            let (mut squares, mut compared) = ([0.0; 3], 0.0);
             e.tally = GatherTally::default();
-            let start = Instant::now();
-            let mut found = Vec::with_capacity((EXITS * draws) as usize);
+            let mut seconds = 0.0;
             for draw in 0..draws {
-                for (i, exit) in exits.iter().enumerate() {
-                    let key = hash(1 + (round * DRAWS + draw) * EXITS + i as u64);
-                    found.push(e.gatherer.gather(&model, &envelope, exit, key, &mut scratch, &mut e.tally));
+                for (t, (tile, exact)) in tiles.iter().zip(&exact).enumerate() {
+                    let exits = if plain { few(tile) } else { tile.clone() };
+                    let key = |i: usize| hash(1 + ((round * DRAWS + draw) * 1000 + t as u64) * 10_000 + i as u64);
+                    let keys: Vec<u64> = (0..exits.len()).map(key).collect();
+                    let start = Instant::now();
+                    e.gatherer.gather((&model, &envelope), &exits, &keys, &mut scratch, &mut e.tally, &mut out);
+                    seconds += start.elapsed().as_secs_f64();
+                    let step = exits.len() / FEW;
+                    for (value, exact) in out.iter().step_by(step).zip(exact) {
+                        for c in 0..3 {
+                            squares[c] += (f64::from(value[c]) / f64::from(exact[c]) - 1.0).powi(2);
+                        }
+                        compared += 1.0;
+                    }
                 }
             }
-            e.seconds = e.seconds.min(start.elapsed().as_secs_f64() / found.len() as f64);
-            for (k, value) in found.iter().enumerate() {
-                for c in 0..3 {
-                    let exact = f64::from(exact[k % exits.len()][c]);
-                    squares[c] += (f64::from(value[c]) / exact - 1.0).powi(2) / found.len() as f64;
-                }
-            }
-            e.noise = squares.map(f64::sqrt);
+            e.seconds = e.seconds.min(seconds / e.tally.exits as f64);
+            e.noise = squares.map(|s| (s / compared).sqrt());
         }
     }
     let notes = entrants.iter().find(|e| e.name == "notes").unwrap().seconds;
@@ -257,17 +284,19 @@ fn timed(bench: &Bench<'_>) {
     group.throughput(Throughput::Elements(10_000));
     group.bench_function("fill, samples", |b| b.iter(|| black_box(bench.fill(&model, 10_000))));
     let cache = bench.fill(&model, 10_000);
-    let exit = bench.exits()[0];
+    let exit = bench.tiles()[0][0];
+    let mut out = Vec::new();
     let mut scratch = Scratch::default();
     let mut tally = GatherTally::default();
     group.throughput(Throughput::Elements(cache.lit.len() as u64));
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &model, 0.0);
+        let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(0.1));
         let mut key = 0;
         group.bench_function(format!("{}, pairs", estimator.name()), |b| {
             b.iter(|| {
                 key += 1;
-                black_box(gatherer.gather(&model, &envelope, &exit, hash(key), &mut scratch, &mut tally))
+                gatherer.gather((&model, &envelope), &[exit], &[hash(key)], &mut scratch, &mut tally, &mut out);
+                black_box(out[0])
             });
         });
     }

@@ -11,7 +11,7 @@
 //! | 4 | [`scene`]: the file as typed, and the checked world |
 //! | 3 | [`query`]: nearest hit · [`bssrdf`]: one file per model · [`film`]: sums, EXR, PNG, metrics |
 //! | 2 | [`geometry`]: meshes, area table · [`optics`]: Fresnel, media · [`sampling`]: Owen-Sobol streams |
-//! | 1 | [`math`], [`error`] |
+//! | 1 | [`math`], [`error`], [`memory`] |
 //!
 //! The command line is the binary's own room, `cli`, above all of these.
 #![deny(unsafe_code)]
@@ -29,6 +29,7 @@ pub mod geometry;
 pub mod integrator;
 pub mod light;
 pub mod math;
+pub mod memory;
 pub mod optics;
 pub mod query;
 pub mod render;

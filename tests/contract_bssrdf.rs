@@ -1,7 +1,7 @@
 //! Properties that every BSSRDF model has to have; a new model joins by its line in `Model::all_for`.
 #![allow(clippy::unwrap_used)] // media of these tests are in range
 
-use marmor::bssrdf::{Bssrdf, Entry, EntryColumns, Exit, Model, ModelName, ModelVisitor};
+use marmor::bssrdf::{Bssrdf, Entry, EntryColumns, Exit, Model, ModelName, ModelVisitor, Partition};
 use marmor::math::{GaussLegendre, Level, Rgb, Vec3, hash, unit_f32};
 use marmor::optics::{FresnelMoments, Medium};
 use proptest::prelude::*;
@@ -193,7 +193,7 @@ proptest! {
         let column = |k: u64| -> Vec<f32> { (0..count as u64).map(|i| 6.0 * unit(seed ^ (k << 32 | i)) - 3.0).collect() };
         let (x, y, z) = (column(1), column(2), column(3));
         let weight: [Vec<f32>; 3] = [4, 5, 6].map(|k| column(k).iter().map(|v| v + 3.0).collect());
-        let entries = EntryColumns { x: &x, y: &y, z: &z, weight: [&weight[0], &weight[1], &weight[2]] };
+        let entries = EntryColumns { x: &x, y: &y, z: &z, weight: [&weight[0], &weight[1], &weight[2]], partition: Partition::NONE };
         let at = Vec3::new(0.1, -0.2, 0.3);
         for model in all(&medium) {
             let Some(gather) = model.gather() else { continue };

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // a test that cannot make its model has failed
 
 use marmor::bssrdf::{Bssrdf, Entry, Exit, Model, ModelName, ModelVisitor};
-use marmor::cache::{Cache, CachedSample, Envelope, GatherTally, Gatherer, Scratch};
+use marmor::cache::{Cache, CachedSample, Envelope, GatherTally, Gatherer, Scratch, Tuning};
 use marmor::math::{Rgb, Vec3, hash, unit_f32};
 use marmor::optics::Medium;
 use marmor::scene::Estimator;
@@ -62,19 +62,34 @@ impl ModelVisitor for Exact<'_> {
     }
 }
 
+/// One exit alone.
+fn gather(
+    gatherer: &Gatherer,
+    model: &Model,
+    envelope: &Envelope,
+    exit: &Exit,
+    key: u64,
+    scratch: &mut Scratch,
+    tally: &mut GatherTally,
+) -> Rgb {
+    let mut out = Vec::new();
+    gatherer.gather((model, envelope), &[*exit], &[key], scratch, tally, &mut out);
+    out[0]
+}
+
 /// Worst deviation of the mean of `runs` estimates from the exact sum, in standard errors; `off` is a planted factor.
 /// Errors of f32 sums are counted as part of the standard error.
 fn deviation(estimator: Estimator, model: &Model, medium: &Medium, count: u64, runs: u64, off: f64) -> f64 {
     let cache = cache(model, count);
     let envelope = Envelope::new(model, medium);
-    let gatherer = Gatherer::new(estimator, copy(&cache), model, 0.1);
+    let gatherer = Gatherer::new(estimator, copy(&cache), model, Tuning::relative(0.1));
     let (mut scratch, mut tally, mut worst) = (Scratch::default(), GatherTally::default(), 0.0_f64);
     for (at, exit) in exits().iter().enumerate() {
         let exact = model.visit(Exact(&cache, exit));
         let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
         for run in 0..runs {
             let key = hash(hash(run + 1) + at as u64);
-            let value = gatherer.gather(model, &envelope, exit, key, &mut scratch, &mut tally);
+            let value = gather(&gatherer, model, &envelope, exit, key, &mut scratch, &mut tally);
             for c in 0..3 {
                 // About the exact value, so that squares keep their digits.
                 let apart = f64::from(value[c]) * off - exact[c];
@@ -108,13 +123,17 @@ fn every_estimator_has_the_mean_of_the_sum() {
     for medium in [MILD, CLEAR, COLOURED, STIFF] {
         for model in models(&medium) {
             for &estimator in Estimator::ALL {
-                if estimator == Estimator::Notes && (medium == COLOURED || medium == STIFF) {
+                if matches!(estimator, Estimator::Notes | Estimator::Thinned) && (medium == COLOURED || medium == STIFF)
+                {
                     continue;
                 }
                 let (count, runs) = match estimator {
                     Estimator::Notes => (200, 300),
                     Estimator::All => (1500, 2),
+                    Estimator::Thinned => (200, 300),
                     Estimator::Cut => (1500, 300),
+                    // Biased: a test of its own.
+                    Estimator::Cluster => continue,
                 };
                 let found = deviation(estimator, &model, &medium, count, runs, 1.0);
                 assert!(found < 6.0, "{} {}: {found}", estimator.name(), model.name().name());
@@ -142,9 +161,9 @@ fn caches_of_a_few_samples_and_of_none_are_summed() {
         let cache = cache(&model, count);
         for &estimator in &[Estimator::All, Estimator::Cut] {
             let exact = model.visit(Exact(&cache, &exits()[0]));
-            let gatherer = Gatherer::new(estimator, copy(&cache), &model, 1e-4);
+            let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(1e-4));
             let mut tally = GatherTally::default();
-            let value = gatherer.gather(&model, &envelope, &exits()[0], 5, &mut scratch, &mut tally);
+            let value = gather(&gatherer, &model, &envelope, &exits()[0], 5, &mut scratch, &mut tally);
             for c in 0..3 {
                 assert!((f64::from(value[c]) - exact[c]).abs() <= 1e-3 * exact[c], "{count} {}", estimator.name());
             }
@@ -161,17 +180,80 @@ fn a_cut_visits_few_of_many_samples_and_its_noise_follows_the_error_asked_for() 
     let exact = model.visit(Exact(&cache, &exits()[1]));
     let mut scratch = Scratch::default();
     let noise = [0.01, 0.1].map(|error| {
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, error);
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(error));
         let mut tally = GatherTally::default();
         let mut squares = 0.0;
         for run in 0..100 {
-            let value = gatherer.gather(&model, &envelope, &exits()[1], hash(run), &mut scratch, &mut tally);
+            let value = gather(&gatherer, &model, &envelope, &exits()[1], hash(run), &mut scratch, &mut tally);
             squares += (f64::from(value[0]) / exact[0] - 1.0).powi(2) / 100.0;
         }
         assert!(tally.evaluated < 100 * 4000, "{tally:?}");
         squares.sqrt()
     });
     assert!(noise[0] < 0.04 && noise[0] < 0.6 * noise[1] && noise[1] < 0.1, "{noise:?}");
+}
+
+/// Exits side by side share a cut and its draws; each has the mean of its own sum.
+#[test]
+fn a_group_of_exits_has_the_means_of_its_sums() {
+    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
+        let model = Model::new(name, &MILD, true);
+        let envelope = Envelope::new(&model, &MILD);
+        let cache = cache(&model, 3000);
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(0.1));
+        // Forty beside each other and five elsewhere.
+        let exits: Vec<Exit> = (0..45_u64)
+            .map(|i| {
+                let aside = if i < 40 { 0.2 } else { 2.0 };
+                let n = Vec3::new(1.0, aside * number(i, 9), aside * number(i, 10)).normalize();
+                Exit { x: 8.0 * n, n, w: n }
+            })
+            .collect();
+        let (mut scratch, mut tally, mut out) = (Scratch::default(), GatherTally::default(), Vec::new());
+        let (runs, mut sums) = (300_u64, vec![[[0.0_f64; 3]; 2]; exits.len()]);
+        let exact: Vec<[f64; 3]> = exits.iter().map(|exit| model.visit(Exact(&cache, exit))).collect();
+        for run in 0..runs {
+            let keys: Vec<u64> = (0..exits.len() as u64).map(|i| hash(1 + run * 1000 + i)).collect();
+            gatherer.gather((&model, &envelope), &exits, &keys, &mut scratch, &mut tally, &mut out);
+            for ((sum, value), exact) in sums.iter_mut().zip(&out).zip(&exact) {
+                for c in 0..3 {
+                    let apart = f64::from(value[c]) - exact[c];
+                    sum[0][c] += apart;
+                    sum[1][c] += apart * apart;
+                }
+            }
+        }
+        assert!(tally.nodes < tally.exits * 100, "the walk is not shared: {tally:?}");
+        let n = runs as f64;
+        for (i, (sum, exact)) in sums.iter().zip(&exact).enumerate() {
+            for c in 0..3 {
+                let mean = sum[0][c] / n;
+                let error = ((sum[1][c] / n - mean * mean).max(0.0) / (n - 1.0)).sqrt();
+                let found = mean.abs() / error.hypot(5e-6 * exact[c]);
+                assert!(found < 6.0, "{} exit {i}: {found} standard errors", name.name());
+            }
+        }
+    }
+}
+
+/// Centroids are biased, the less the finer the cut; at the finest it is the plain sum.
+#[test]
+fn clusters_come_near_the_sum() {
+    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
+        let model = Model::new(name, &MILD, true);
+        let envelope = Envelope::new(&model, &MILD);
+        let cache = cache(&model, 3000);
+        let (mut scratch, mut tally) = (Scratch::default(), GatherTally::default());
+        let exit = &exits()[1];
+        let exact = model.visit(Exact(&cache, exit));
+        let bias = [1e-6, 0.03].map(|error| {
+            let gatherer = Gatherer::new(Estimator::Cluster, copy(&cache), &model, Tuning::relative(error));
+            let draws = [1, 2].map(|key| gather(&gatherer, &model, &envelope, exit, key, &mut scratch, &mut tally));
+            assert!(draws[0] == draws[1], "nothing is left to chance");
+            (f64::from(draws[0][0]) / exact[0] - 1.0).abs()
+        });
+        assert!(bias[0] < 1e-5 && bias[1] < 0.05 && bias[1] > bias[0], "{}: {bias:?}", name.name());
+    }
 }
 
 /// The tree is built by several tasks, and nothing of it may depend on who does what.
@@ -184,10 +266,11 @@ fn the_same_bits_come_out_for_any_number_of_threads() {
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, 0.1);
+                let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(0.1));
                 let mut scratch = Scratch::default();
                 let mut tally = GatherTally::default();
-                exits().map(|e| gatherer.gather(&model, &envelope, &e, 9, &mut scratch, &mut tally).0.map(f32::to_bits))
+                exits()
+                    .map(|e| gather(&gatherer, &model, &envelope, &e, 9, &mut scratch, &mut tally).0.map(f32::to_bits))
             })
         };
         let one = run(1);

@@ -20,6 +20,7 @@ const ROWS: &[(&str, u32)] = &[
     ("optics", 2),
     ("sampling", 2),
     ("math", 1),
+    ("memory", 1),
     ("error", 1),
 ];
 

@@ -8,7 +8,7 @@ use marmor::optics::{FresnelMoments, reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile};
+use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -177,7 +177,7 @@ fn the_dark_side_of_a_light_lights_nothing() {
 #[test]
 fn a_white_convex_body_vanishes_in_a_white_furnace() {
     let text = SPOT.replace("0.5]", "3]").replace("fov = 0.2", "fov = 60")
-        + "[environment]\nradiance = 1\n[[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"white\"\n[material.white]\ntype = \"diffuse\"\nalbedo = 1\n";
+        + "[environment]\nradiance = 1\n[[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nnormals = \"geometric\"\nmaterial = \"white\"\n[material.white]\ntype = \"diffuse\"\nalbedo = 1\n";
     let scene = load(&text);
     for backend in backends() {
         for pixel in render(&Direct::new(&scene, 2).unwrap(), &scene, backend, 8, 1).pixels {
@@ -190,9 +190,11 @@ const WAX: &str = "[material.wax]\ntype = \"translucent\"\nsigma_s_prime = [2, 3
 
 fn subsurface(seed: u64) -> SubsurfaceOptions {
     SubsurfaceOptions {
+        single: false,
         cache_samples: 4096,
         estimator: Estimator::Notes,
-        cut_error: 0.03,
+        cut_error: Some(0.03),
+        spread: Spread::Seen,
         entry: EntrySampling::Light,
         points: Points::Sobol,
         specular: false,

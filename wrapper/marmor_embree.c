@@ -28,7 +28,8 @@ _Static_assert(sizeof(struct RTCRayHit) == sizeof(struct RTCRay) + sizeof(struct
 struct MarmorScene {
     RTCDevice device;
     RTCScene scene;
-    float scale; /* Embree's coordinates over the caller's; a power of two */
+    bool packets; /* whether this library traces them, and as single rays */
+    float scale;  /* Embree's coordinates over the caller's; a power of two */
     _Atomic long long bytes;
     atomic_flag has_error; /* Embree reports from its own threads too */
     char error[512];       /* text of the first device error since the last `status`, empty if none */
@@ -180,6 +181,110 @@ int marmor_scene_occluded(const MarmorScene *scene, const MarmorRay *ray) {
     return query.tfar == -INFINITY ? MARMOR_HIT : MARMOR_MISS; /* how Embree reports occlusion */
 }
 
+/* Rays that are handed over together: packets are in both versions, while Embree 4 has dropped streams. */
+#define PACKET 16
+
+/* `count` rays, at most PACKET, in the layout of packets; lanes left over and empty intervals are not valid. */
+static void set_packet(struct RTCRay16 *to, int *valid, float *per_t, const MarmorRay *rays, unsigned count, float scale) {
+    for (unsigned i = 0; i < PACKET; i++) {
+        struct RTCRay ray;
+        per_t[i] = set_ray(&ray, &rays[i < count ? i : 0], scale);
+        valid[i] = i < count && ray.tnear < ray.tfar ? -1 : 0;
+        to->org_x[i] = ray.org_x;
+        to->org_y[i] = ray.org_y;
+        to->org_z[i] = ray.org_z;
+        to->tnear[i] = ray.tnear;
+        to->dir_x[i] = ray.dir_x;
+        to->dir_y[i] = ray.dir_y;
+        to->dir_z[i] = ray.dir_z;
+        to->time[i] = 0.0f;
+        to->tfar[i] = ray.tfar;
+        to->mask[i] = 0xffffffffu;
+        to->id[i] = 0;
+        to->flags[i] = 0;
+    }
+}
+
+static void intersect_packet(RTCScene scene, const int *valid, struct RTCRayHit16 *packet) {
+    for (unsigned i = 0; i < PACKET; i++) {
+        packet->hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+        packet->hit.primID[i] = RTC_INVALID_GEOMETRY_ID;
+    }
+#if MARMOR_EMBREE_MAJOR == 4
+    struct RTCIntersectArguments arguments;
+    rtcInitIntersectArguments(&arguments);
+    arguments.flags = RTC_RAY_QUERY_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, packet, &arguments);
+#else
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    rtcIntersect16(valid, scene, &context, packet);
+#endif
+}
+
+static void occluded_packet(RTCScene scene, const int *valid, struct RTCRay16 *packet) {
+#if MARMOR_EMBREE_MAJOR == 4
+    rtcOccluded16(valid, scene, packet, NULL);
+#else
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded16(valid, scene, &context, packet);
+#endif
+}
+
+/* Whether the first `count` rays start at one point: camera rays do. */
+static bool from_one_point(const MarmorRay *rays, unsigned count) {
+    for (unsigned i = 1; i < count; i++)
+        if (memcmp(rays[i].origin, rays[0].origin, sizeof rays[0].origin) != 0) return false;
+    return true;
+}
+
+void marmor_scene_closest_batch(const MarmorScene *scene, const MarmorRay *rays, unsigned count, MarmorHit *hits,
+                                unsigned char *found) {
+    for (unsigned first = 0; first < count; first += PACKET) {
+        unsigned n = count - first < PACKET ? count - first : PACKET;
+        if (!scene->packets || !from_one_point(rays + first, n)) {
+            /* Rays that have nothing in common are no faster together. */
+            for (unsigned i = first; i < first + n; i++)
+                found[i] = (unsigned char)marmor_scene_closest(scene, rays + i, hits + i);
+            continue;
+        }
+        struct RTCRayHit16 packet;
+        _Alignas(64) int valid[PACKET];
+        float per_t[PACKET];
+        set_packet(&packet.ray, valid, per_t, rays + first, n, scene->scale);
+        intersect_packet(scene->scene, valid, &packet);
+        for (unsigned i = 0; i < n; i++) {
+            MarmorHit *hit = hits + first + i;
+            found[first + i] = packet.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID ? MARMOR_HIT : MARMOR_MISS;
+            hit->t = packet.ray.tfar[i] * per_t[i];
+            hit->u = packet.hit.u[i];
+            hit->v = packet.hit.v[i];
+            hit->mesh = packet.hit.geomID[i];
+            hit->triangle = packet.hit.primID[i];
+        }
+    }
+}
+
+void marmor_scene_occluded_batch(const MarmorScene *scene, const MarmorRay *rays, unsigned count, unsigned char *found) {
+    for (unsigned first = 0; first < count; first += PACKET) {
+        unsigned n = count - first < PACKET ? count - first : PACKET;
+        if (!scene->packets) {
+            for (unsigned i = first; i < first + n; i++)
+                found[i] = (unsigned char)marmor_scene_occluded(scene, rays + i);
+            continue;
+        }
+        struct RTCRay16 packet;
+        _Alignas(64) int valid[PACKET];
+        float per_t[PACKET];
+        set_packet(&packet, valid, per_t, rays + first, n, scene->scale);
+        occluded_packet(scene->scene, valid, &packet);
+        for (unsigned i = 0; i < n; i++)
+            found[first + i] = valid[i] && packet.tfar[i] == -INFINITY ? MARMOR_HIT : MARMOR_MISS;
+    }
+}
+
 static RTCScene new_scene(RTCDevice device) {
     RTCScene scene = rtcNewScene(device);
     if (scene) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
@@ -209,10 +314,33 @@ static void add_triangles(RTCDevice device, RTCScene scene, float scale, unsigne
 
 static bool near(float a, float b) { return fabsf(a - b) <= 1e-5f; } /* the values checked are of order 1 */
 
+/* Whether packets of two known rays find and miss what they must; `wrong` is set if they write where they must not. A
+ * library may be built without packets, and then reports an error. */
+static bool known_packets(RTCDevice device, RTCScene scene, const MarmorRay *hit_and_miss, const char **wrong) {
+    struct {
+        struct RTCRayHit16 rayhit;
+        unsigned char guard[64];
+    } q;
+    _Alignas(64) int valid[PACKET];
+    float per_t[PACKET];
+    memset(&q, GUARD, sizeof q);
+    set_packet(&q.rayhit.ray, valid, per_t, hit_and_miss, 2, 1.0f);
+    intersect_packet(scene, valid, &q.rayhit);
+    for (size_t i = 0; i < sizeof q.guard; i++)
+        if (q.guard[i] != GUARD) *wrong = "the library writes beyond the header's RTCRayHit16";
+    bool right = q.rayhit.hit.geomID[0] == 5 && q.rayhit.hit.primID[0] == 0 && near(q.rayhit.ray.tfar[0] * per_t[0], 2.0f) &&
+                 near(q.rayhit.hit.u[0], 0.25f) && near(q.rayhit.hit.v[0], 0.25f) &&
+                 q.rayhit.hit.geomID[1] == RTC_INVALID_GEOMETRY_ID;
+    set_packet(&q.rayhit.ray, valid, per_t, hit_and_miss, 2, 1.0f);
+    occluded_packet(scene, valid, &q.rayhit.ray);
+    right = right && q.rayhit.ray.tfar[0] == -INFINITY && q.rayhit.ray.tfar[1] != -INFINITY;
+    return rtcGetDeviceError(device) == RTC_ERROR_NONE && right;
+}
+
 /* The triangle (1,0,3) (3,0,3) (1,4,3) as geometry 5 and the ray from (1.5,1,-1) along (0,0,2) meet at t = 2 with
  * u = v = 1/4 and the normal (0,0,8) or its opposite, whose direction Embree has changed; the ray from (3,3,-1) passes by.
- * Returns what was wrong or NULL. */
-static const char *known_rays(RTCDevice device) {
+ * Returns what was wrong or NULL, and whether packets work. */
+static const char *known_rays(RTCDevice device, bool *packets) {
     static const float positions[9] = {1, 0, 3, 3, 0, 3, 1, 4, 3};
     static const unsigned triangle[3] = {0, 1, 2};
     const char *wrong = NULL;
@@ -246,6 +374,8 @@ static const char *known_rays(RTCDevice device) {
     if (!wrong && (marmor_scene_closest(&scene, &beside, &none) != MARMOR_MISS ||
                    marmor_scene_occluded(&scene, &beside) != MARMOR_MISS))
         wrong = "a ray with a known miss hits";
+    MarmorRay both[2] = {ray, beside};
+    if (!wrong) *packets = known_packets(device, rtc_scene, both, &wrong);
     rtcReleaseScene(rtc_scene);
     return wrong;
 }
@@ -271,7 +401,11 @@ int marmor_scene_open(MarmorScene **out, float largest, char *message, unsigned 
         return fail(message, message_bytes, text);
     }
     rtcSetDeviceErrorFunction(scene->device, on_error, scene);
-    const char *wrong = known_rays(scene->device);
+    const char *wrong = known_rays(scene->device, &scene->packets);
+    if (!wrong && !scene->packets) { /* the library has none: no reason to stop */
+        scene->error[0] = '\0';
+        atomic_flag_clear(&scene->has_error);
+    }
     if (wrong || status(scene, text, sizeof text) != MARMOR_OK) {
         char both[1024];
         snprintf(both, sizeof both, "self-check of Embree %u.%u.%u failed: %s", version / 10000, version / 100 % 100,

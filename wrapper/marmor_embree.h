@@ -49,6 +49,14 @@ int marmor_scene_closest(const MarmorScene *scene, const MarmorRay *ray, MarmorH
 /* MARMOR_HIT if anything is hit. */
 int marmor_scene_occluded(const MarmorScene *scene, const MarmorRay *ray);
 
+/* marmor_scene_closest for each of `count` rays: MARMOR_HIT or MARMOR_MISS goes to `found`, hits to `hits`. Rays from one
+ * point into nearly one direction are traced together. */
+void marmor_scene_closest_batch(const MarmorScene *scene, const MarmorRay *rays, unsigned count, MarmorHit *hits,
+                                unsigned char *found);
+
+/* marmor_scene_occluded for each of `count` rays. */
+void marmor_scene_occluded_batch(const MarmorScene *scene, const MarmorRay *rays, unsigned count, unsigned char *found);
+
 /* Bytes that Embree holds for this scene: vertices, indices, tree. */
 unsigned long long marmor_scene_bytes(const MarmorScene *scene);
 

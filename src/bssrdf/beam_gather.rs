@@ -1,5 +1,6 @@
 //! Vectorised sums of photon beam diffusion over many cached entries, one depth each.
 
+use super::Partition;
 use super::beam::PhotonBeamDiffusion;
 use super::radial::{BLOCK, LANES, add, in_mean_free_paths};
 use crate::math::{Kernel, Level, Vec3, dispatch_at, exp2_m1, times_exp2};
@@ -23,6 +24,8 @@ pub struct SourceColumns<'a> {
     pub travelled: &'a [f32],
     /// Flux or any other weight, per channel, times [`super::DepthLaw::weights`] of t.
     pub weight: [&'a [f32]; 3],
+    /// Only the far part is summed, by [`Partition::far_source`].
+    pub partition: Partition,
 }
 
 /// One channel of the kernel in f32, lengths in transport mean free paths.
@@ -90,7 +93,10 @@ impl Kernel for Sum<'_> {
                 apart
             });
             let (below, travelled) = (block(e.below, start, count, 1.0), block(e.travelled, start, count, 1.0));
-            let mut s = [0.0_f32; BLOCK];
+            let (mut s, mut far) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+            for i in 0..BLOCK {
+                far[i] = e.partition.far_source(x[i] * x[i] + y[i] * y[i] + z[i] * z[i], travelled[i]);
+            }
             for (c, lanes) in lanes.iter_mut().enumerate() {
                 if c == 0 || !self.grey {
                     let channel = self.channels[c];
@@ -99,7 +105,11 @@ impl Kernel for Sum<'_> {
                         s[i] = channel.value(r2, below[i], travelled[i]);
                     }
                 }
-                add(lanes, &s, &block(e.weight[c], start, count, 0.0));
+                let mut weight = block(e.weight[c], start, count, 0.0);
+                for (weight, far) in weight.iter_mut().zip(&far) {
+                    *weight *= far;
+                }
+                add(lanes, &s, &weight);
             }
             start += BLOCK;
         }
@@ -171,7 +181,7 @@ mod tests {
         fn columns(&self) -> SourceColumns<'_> {
             let [x, y, z, below, travelled] = &self.columns;
             let weight = [&*self.weight[0], &*self.weight[1], &*self.weight[2]];
-            SourceColumns { x, y, z, below, travelled, weight }
+            SourceColumns { x, y, z, below, travelled, weight, partition: Partition::NONE }
         }
     }
 
@@ -228,6 +238,7 @@ mod tests {
                     below: &[below],
                     travelled: &[t],
                     weight: [&one; 3],
+                    partition: Partition::NONE,
                 };
                 assert!(model.gather(Vec3::ZERO, sources).iter().all(|v| v.is_finite()), "{x} {below} {t}");
             }

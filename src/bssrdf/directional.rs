@@ -305,6 +305,10 @@ impl Bssrdf for DirectionalDipole {
         self.decay
     }
 
+    fn clamps(&self) -> bool {
+        true
+    }
+
     fn claims(&self) -> Claims {
         Claims { first_order: true, reciprocal: false, bounded_energy: false }
     }

@@ -26,14 +26,16 @@ struct Sum<'a> {
 }
 
 impl Kernel for Sum<'_> {
-    type Out = [f64; 3];
+    /// The sums, and how many values with a weight were clamped at 0.
+    type Out = ([f64; 3], u64);
 
     #[inline(always)]
-    fn run(self) -> [f64; 3] {
+    fn run(self) -> ([f64; 3], u64) {
         let (e, d) = (&self.entries, &self.directions);
         let columns = [e.x, e.y, e.z, d.n[0], d.n[1], d.n[2], d.w[0], d.w[1], d.w[2]];
         let count = columns.iter().chain(&e.weight).map(|c| c.len()).min().unwrap_or(0);
         let mut lanes = [[0.0_f64; BLOCK]; 3];
+        let mut below_zero = [0_u64; BLOCK];
         let mut start = 0;
         while start < count {
             // Past the end, entries like none: of weight 0, at a distance from the exit.
@@ -41,31 +43,39 @@ impl Kernel for Sum<'_> {
                 .map(|(column, at)| block(column, start, count, at as f32 + 1.0));
             let n = d.n.map(|column| block(column, start, count, 1.0));
             let w = d.w.map(|column| block(column, start, count, -1.0));
-            let weight = e.weight.map(|column| block(column, start, count, 0.0));
+            let mut weight = e.weight.map(|column| block(column, start, count, 0.0));
             let mut pairs = [[0.0_f64; BLOCK]; 7];
             for i in 0..BLOCK {
                 let vector = |v: &[[f32; BLOCK]; 3]| DVec3::new(v[0][i].into(), v[1][i].into(), v[2][i].into());
-                let pair = Pair::new(self.at - vector(&x), vector(&n), vector(&w), self.n_o).columns();
+                let apart = self.at - vector(&x);
+                let far = e.partition.far(apart.length_squared() as f32);
+                weight.iter_mut().for_each(|w| w[i] *= far);
+                let pair = Pair::new(apart, vector(&n), vector(&w), self.n_o).columns();
                 for (column, value) in pairs.iter_mut().zip(pair) {
                     column[i] = value;
                 }
             }
             let mut s = [0.0_f64; BLOCK];
+            let mut negative = [0_u64; BLOCK];
             for c in 0..3 {
                 if c == 0 || !self.grey {
                     let channel = self.channels[c];
-                    for (i, s) in s.iter_mut().enumerate() {
+                    for (i, (s, negative)) in s.iter_mut().zip(&mut negative).enumerate() {
                         let value = channel.kernel(&Pair::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
                         *s = clamped(value).min(f64::from(f32::MAX));
+                        *negative = u64::from(value < 0.0);
                     }
                 }
                 for ((lane, s), &weight) in lanes[c].iter_mut().zip(&s).zip(&weight[c]) {
                     *lane += s * f64::from(weight);
                 }
+                for ((sum, negative), &weight) in below_zero.iter_mut().zip(&negative).zip(&weight[c]) {
+                    *sum += if weight > 0.0 { *negative } else { 0 };
+                }
             }
             start += BLOCK;
         }
-        lanes.map(|l| l.iter().sum())
+        (lanes.map(|l| l.iter().sum()), below_zero.iter().sum())
     }
 }
 
@@ -81,7 +91,7 @@ fn block(column: &[f32], start: usize, count: usize, fill: f32) -> [f32; BLOCK] 
 }
 
 impl DirectionalDipole {
-    /// Σ weight_i · S_d(entry i, exit) per channel to an exit at `at` with outward normal `n_o`, by the code that gives
+    /// Σ weight_i · S_d(entry i, exit) per channel, and how many of the values were below zero and taken as 0, to an exit at `at` with outward normal `n_o`, by the code that gives
     /// [`super::Bssrdf::eval`], summed in a fixed order: the bits do not depend on `level`.
     pub fn gather_at(
         &self,
@@ -90,20 +100,26 @@ impl DirectionalDipole {
         n_o: Vec3,
         entries: EntryColumns<'_>,
         directions: DirectionColumns<'_>,
-    ) -> [f64; 3] {
+    ) -> ([f64; 3], u64) {
         let (channels, grey) = self.channels();
         dispatch_at(level, Sum { channels, grey, at: at.as_dvec3(), n_o: n_o.as_dvec3(), entries, directions })
     }
 
     /// [`Self::gather_at`] with the widest instruction set of this machine.
-    pub fn gather(&self, at: Vec3, n_o: Vec3, entries: EntryColumns<'_>, directions: DirectionColumns<'_>) -> [f64; 3] {
+    pub fn gather(
+        &self,
+        at: Vec3,
+        n_o: Vec3,
+        entries: EntryColumns<'_>,
+        directions: DirectionColumns<'_>,
+    ) -> ([f64; 3], u64) {
         self.gather_at(Level::best(), at, n_o, entries, directions)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bssrdf, Entry, Exit};
+    use super::super::{Bssrdf, Entry, Exit, Partition};
     use super::*;
     use crate::math::{Rgb, hash, unit_f32};
     use crate::optics::Medium;
@@ -116,7 +132,7 @@ mod tests {
             for count in [1_u64, 15, 16, 1000] {
                 let mut columns: [Vec<f32>; 12] = Default::default();
                 let (at, n_o) = (Vec3::new(0.3, -0.2, 1.0), Vec3::new(0.6, 0.0, 0.8));
-                let mut expected = [0.0; 3];
+                let (mut expected, mut clamped_ones) = ([0.0; 3], 0);
                 for i in 0..count {
                     let u = |k: u64| unit_f32((hash(16 * i + k) >> 32) as u32) - 0.5;
                     let entry = Entry {
@@ -124,8 +140,10 @@ mod tests {
                         n: Vec3::new(u(3), u(4), 1.0).normalize(),
                         w: Vec3::new(u(5), u(6), -1.0).normalize(),
                     };
-                    let value = model.eval(&entry, &Exit { x: at, n: n_o, w: n_o });
+                    let exit = Exit { x: at, n: n_o, w: n_o };
+                    let value = model.eval(&entry, &exit);
                     let weight = [1.0, u(7) + 0.5, 2.0];
+                    clamped_ones += model.eval_signed(&entry, &exit).0.iter().filter(|&&v| v < 0.0).count() as u64;
                     let row = [entry.x, entry.n, entry.w].map(|v| v.to_array()).concat();
                     for (column, value) in columns.iter_mut().zip(row.into_iter().chain(weight)) {
                         column.push(value);
@@ -135,14 +153,15 @@ mod tests {
                     }
                 }
                 let [x, y, z, n0, n1, n2, w0, w1, w2, r, g, b] = columns.each_ref().map(Vec::as_slice);
-                let entries = EntryColumns { x, y, z, weight: [r, g, b] };
+                let entries = EntryColumns { x, y, z, weight: [r, g, b], partition: Partition::NONE };
                 let directions = DirectionColumns { n: [n0, n1, n2], w: [w0, w1, w2] };
-                let sum = model.gather_at(Level::Baseline, at, n_o, entries, directions);
+                let (sum, clamps) = model.gather_at(Level::Baseline, at, n_o, entries, directions);
+                assert_eq!(clamps, clamped_ones);
                 for c in 0..3 {
                     assert!((sum[c] - expected[c]).abs() <= 1e-6 * expected[c], "{count}: {sum:?} {expected:?}");
                 }
                 for level in Level::available() {
-                    assert_eq!(model.gather_at(level, at, n_o, entries, directions), sum, "{level:?}");
+                    assert_eq!(model.gather_at(level, at, n_o, entries, directions), (sum, clamps), "{level:?}");
                 }
             }
         }

@@ -13,6 +13,7 @@ mod directional_gather;
 mod exponential;
 mod multipole;
 mod normalised;
+mod partition;
 mod radial;
 mod single;
 mod slab;
@@ -30,6 +31,7 @@ pub use depth::DepthLaw;
 pub use directional::{DirectionalChannel, DirectionalDipole};
 pub use directional_gather::DirectionColumns;
 pub use normalised::{NormalisedDiffusion, WidthFit};
+pub use partition::Partition;
 pub use radial::{EntryColumns, Gather, Radial};
 pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
 pub use slab::Slab;
@@ -89,6 +91,11 @@ pub trait Bssrdf: Sync {
     /// Diffuse reflectance of a half space per entered flux, uniform illumination, in [0, 1] where the model
     /// conserves energy.
     fn total(&self) -> Rgb;
+
+    /// Whether the formula is below zero in places, where [`Self::eval`] has 0.
+    fn clamps(&self) -> bool {
+        false
+    }
 
     /// What the model promises; tests hold it to that.
     fn claims(&self) -> Claims {
@@ -287,6 +294,15 @@ impl Model {
         match self {
             Self::Beam(model) => model.sample_depth(u),
             _ => 0.0,
+        }
+    }
+
+    /// What decides how far an entry is from an exit [unit²], see [`Partition`]: the distance between them, or for models
+    /// with interior sources the way along the refracted ray and from its end to the exit.
+    pub fn apart2(&self, entry: &Entry, depth: f32, exit: &Exit) -> f32 {
+        match self {
+            Self::Beam(_) => ((entry.x + entry.w * depth).distance(exit.x) + depth).powi(2),
+            _ => entry.x.distance_squared(exit.x),
         }
     }
 

@@ -1,7 +1,7 @@
 //! What models share that know the distance between entry and exit alone: one formula per channel, from which come
 //! the value for a pair of points, vectorised batches, and sums over a cache of entry points.
 
-use super::{Bssrdf, Claims, Entry, Exit};
+use super::{Bssrdf, Claims, Entry, Exit, Partition};
 use crate::math::{Kernel, Level, Rgb, Vec3, dispatch_at};
 
 /// A model that can say M(r): exitance at distance r per flux that entered.
@@ -34,6 +34,8 @@ pub struct EntryColumns<'a> {
     pub z: &'a [f32],
     /// Flux or any other weight, per channel.
     pub weight: [&'a [f32]; 3],
+    /// Only the far part is summed.
+    pub partition: Partition,
 }
 
 /// A model whose S_d is a function of the distance alone, so that sums over many entries vectorise.
@@ -259,8 +261,9 @@ impl<C: Formula> Kernel for Sum<'_, C> {
         let mut lanes = [[0.0_f64; LANES]; 3];
         let mut start = 0;
         while start < count {
-            let block = Block::load(e, start, count, self.x);
+            let mut block = Block::load(e, start, count, self.x);
             let r2 = block.distances(self.x);
+            block.keep_far(e.partition, &r2);
             let mut s = [0.0_f32; BLOCK];
             for (c, lanes) in lanes.iter_mut().enumerate() {
                 if c == 0 || !self.grey {
@@ -308,6 +311,19 @@ impl Block {
             y: column(e.y, at.y),
             z: column(e.z, at.z),
             weight: e.weight.map(|w| column(w, 0.0)),
+        }
+    }
+
+    #[inline(always)]
+    fn keep_far(&mut self, partition: Partition, r2: &[f32; BLOCK]) {
+        let mut far = [0.0; BLOCK];
+        for (far, &r2) in far.iter_mut().zip(r2) {
+            *far = partition.far(r2);
+        }
+        for weight in &mut self.weight {
+            for (weight, far) in weight.iter_mut().zip(&far) {
+                *weight *= far;
+            }
         }
     }
 

@@ -307,6 +307,10 @@ impl Bssrdf for Slab {
         self.total_reflected
     }
 
+    fn clamps(&self) -> bool {
+        true
+    }
+
     fn claims(&self) -> Claims {
         Claims { first_order: true, reciprocal: true, bounded_energy: true }
     }

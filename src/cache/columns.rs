@@ -1,7 +1,7 @@
 //! Cached samples in columns, as the vectorised sums of the models want them.
 
 use super::CachedSample;
-use crate::bssrdf::{Bssrdf, DirectionColumns, Entry, EntryColumns, Exit, Model, SourceColumns};
+use crate::bssrdf::{DirectionColumns, Entry, EntryColumns, Exit, Model, Partition, Slab, SourceColumns};
 use crate::math::Vec3;
 
 /// Columns a model may need: point, weight, and two of a source or six of directions.
@@ -36,6 +36,18 @@ impl Columns {
         }
         for sample in samples {
             all.push_sample(model, sample);
+        }
+        all
+    }
+
+    /// Entry points and weights alone.
+    pub fn points(model: &Model, samples: &[CachedSample]) -> Self {
+        let mut all = Self { used: LEAST, ..Self::new(model) };
+        for sample in samples {
+            let (x, flux) = (sample.entry.x, sample.flux.0);
+            for (column, value) in all.columns.iter_mut().zip([x.x, x.y, x.z, flux[0], flux[1], flux[2]]) {
+                column.push(value);
+            }
         }
         all
     }
@@ -112,38 +124,78 @@ impl Columns {
         }
     }
 
-    /// Σ S_d · weight per channel over all samples, by the vectorised code of `model` where it has one.
-    pub fn sum(&self, model: &Model, exit: &Exit) -> [f64; 3] {
+    /// For each range of samples their mean, weighted by `mass`, with the sum of their weights; directions of unit length.
+    pub fn means(
+        &self,
+        model: &Model,
+        ranges: impl Iterator<Item = std::ops::Range<usize>>,
+        mass: impl Fn(usize) -> f64,
+    ) -> Self {
+        let mut all = Self::new(model);
+        for range in ranges {
+            let (mut row, mut total) = ([0.0_f64; MOST], 0.0);
+            for i in range {
+                let own = mass(i);
+                total += own;
+                for (k, (mean, column)) in row.iter_mut().zip(&self.columns[..self.used]).enumerate() {
+                    *mean += f64::from(column[i]) * if (3..LEAST).contains(&k) { 1.0 } else { own };
+                }
+            }
+            let scale = if total > 0.0 { 1.0 / total } else { 0.0 };
+            for k in (0..self.used).filter(|k| !(3..LEAST).contains(k)) {
+                row[k] *= scale;
+            }
+            if self.used == MOST {
+                for k in [LEAST, LEAST + 3] {
+                    let length = row[k..k + 3].iter().map(|v| v * v).sum::<f64>().sqrt();
+                    row[k..k + 3].iter_mut().for_each(|v| *v /= if length > 0.0 { length } else { 1.0 });
+                }
+            }
+            for (column, value) in all.columns[..all.used].iter_mut().zip(row) {
+                column.push(value as f32);
+            }
+        }
+        all
+    }
+
+    /// Σ S_d · weight per channel over all samples, by the vectorised code of `model` where it has one; of S_d the part
+    /// that is far by `partition`, from the points of the columns. Values of S_d below zero, which count as 0, add to
+    /// `clamped`.
+    pub fn sum(&self, model: &Model, exit: &Exit, partition: Partition, clamped: &mut u64) -> [f64; 3] {
         let c = &self.columns;
-        let entries = EntryColumns { x: &c[0], y: &c[1], z: &c[2], weight: [&c[3], &c[4], &c[5]] };
+        let entries = EntryColumns { x: &c[0], y: &c[1], z: &c[2], weight: [&c[3], &c[4], &c[5]], partition };
         if let Some(model) = model.gather() {
             return model.gather(exit.x, entries);
         }
         match model {
             Model::Beam(beam) => {
-                let EntryColumns { x, y, z, weight } = entries;
-                beam.gather(exit.x, SourceColumns { x, y, z, below: &c[6], travelled: &c[7], weight })
+                let EntryColumns { x, y, z, weight, partition } = entries;
+                beam.gather(exit.x, SourceColumns { x, y, z, below: &c[6], travelled: &c[7], weight, partition })
             }
             Model::Directional(dipole) => {
                 let directions = DirectionColumns { n: [&c[6], &c[7], &c[8]], w: [&c[9], &c[10], &c[11]] };
-                dipole.gather(exit.x, exit.n, entries, directions)
+                let (sum, below_zero) = dipole.gather(exit.x, exit.n, entries, directions);
+                *clamped += below_zero;
+                sum
             }
-            Model::Slab(slab) => self.plain(&**slab, exit),
+            Model::Slab(slab) => self.plain(slab, exit, partition, clamped),
             // Those that know the distance alone have been summed above.
             Model::Standard(_) | Model::Better(_) | Model::Normalised(_) => [0.0; 3],
         }
     }
 
-    /// A loop over pairs, for models with columns of normals and directions and no vectorised sum.
-    fn plain<B: Bssrdf>(&self, model: &B, exit: &Exit) -> [f64; 3] {
+    /// A loop over pairs: a slab has columns of normals and directions and no vectorised sum.
+    fn plain(&self, slab: &Slab, exit: &Exit, partition: Partition, clamped: &mut u64) -> [f64; 3] {
         let (mut sum, c) = ([0.0; 3], &self.columns);
         let vector = |k: usize, i: usize| Vec3::new(c[k][i], c[k + 1][i], c[k + 2][i]);
         for i in 0..self.len() {
             let entry = Entry { x: self.point(i), n: vector(LEAST, i), w: vector(LEAST + 3, i) };
-            let s = model.eval(&entry, exit);
+            let s = slab.eval_signed(&entry, exit);
+            let far = partition.far(entry.x.distance_squared(exit.x));
             let weight = self.weight(i);
             for c in 0..3 {
-                sum[c] += f64::from(s[c] * weight[c]);
+                *clamped += u64::from(s[c] < 0.0 && weight[c] > 0.0);
+                sum[c] += f64::from(s[c].max(0.0) * weight[c] * far);
             }
         }
         sum

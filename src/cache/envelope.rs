@@ -24,6 +24,8 @@ pub struct Fall {
 /// [`Fall`] by distance.
 pub struct Envelope {
     rows: Vec<Fall>,
+    /// Decay per channel [1/unit].
+    decay: [f32; 3],
     /// Variation of S_d over members of a node that does not come from the distance, relative: from directions or depths.
     pub other: f32,
 }
@@ -53,7 +55,40 @@ impl Envelope {
                 fall
             })
             .collect();
-        Self { rows, other }
+        Self { rows, decay: medium.sigma_tr().0, other }
+    }
+
+    /// S_d at √`r2` ≥ 0, of each channel stretched until its decay length is at least `least` [unit], its integral over the
+    /// plane kept.
+    #[inline]
+    pub fn widened(&self, r2: f32, least: f32) -> Vec4 {
+        let scale = self.decay.map(|decay| if decay * least > 1.0 { 1.0 / (decay * least) } else { 1.0 });
+        if scale == [1.0; 3] {
+            return self.at(r2).value;
+        }
+        let mut value = Vec4::ZERO;
+        for c in 0..3 {
+            let area = scale[c] * scale[c];
+            value[c] = area * self.at(r2 * area).value[c];
+        }
+        value
+    }
+
+    /// (∫ S_d dA)² / ∫ S_d² dA on a plane, the least of the channels [unit²]: the area whose light makes the noise of a
+    /// sum over samples. Infinite where no channel scatters.
+    pub fn effective_area(&self) -> f64 {
+        let (mut first, mut second) = ([0.0; 3], [0.0; 3]);
+        for (i, fall) in self.rows.iter().enumerate() {
+            let r2 = |i: usize| f64::from(f32::from_bits(((EXPONENTS.start << (23 - SHIFT)) + i as u32) << SHIFT));
+            let ring = std::f64::consts::PI * (r2(i + 1) - r2(i));
+            for c in 0..3 {
+                let value = f64::from(fall.value[c]);
+                first[c] += value * ring;
+                second[c] += value * value * ring;
+            }
+        }
+        let area = |c: usize| if second[c] > 0.0 { first[c] * first[c] / second[c] } else { f64::INFINITY };
+        (0..3).map(area).fold(f64::INFINITY, f64::min)
     }
 
     /// At the largest tabulated distance up to √`r2`, `r2` ≥ 0 [unit²].

@@ -1,24 +1,49 @@
 //! The estimators by name: what each prepares once a pass, and the sum at an exit.
 
-use super::{Buffer, Cache, Columns, Envelope, GatherTally, Tree, cut, notes};
-use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor};
-use crate::math::Rgb;
+use super::{Buffer, Cache, Columns, Cut, Envelope, GatherTally, Thinning, Tree, notes, thinned};
+use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor, Partition};
+use crate::math::{Rgb, Vec4};
 use crate::scene::Estimator;
 
 /// Below this many samples `cut` is the plain vectorised sum, which is then faster than any tree.
 pub const PLAIN_SUM: usize = 1024;
 
+/// How fine sums are, and of what part.
+#[derive(Clone, Copy, Debug)]
+pub struct Tuning {
+    /// The largest share of the sum that one node of a cut may be wrong by.
+    pub error: f32,
+    /// Means over the samples below this are held to the accuracy of one of this size [S_d flux]; the fourth is 0.
+    pub floor: Vec4,
+    /// The far part of S_d is summed; `notes` and `thinned` sum it whole.
+    pub partition: Partition,
+}
+
+impl Tuning {
+    /// Everything, to a share of `error` of itself.
+    pub fn relative(error: f32) -> Self {
+        Self { error, floor: Vec4::ZERO, partition: Partition::NONE }
+    }
+}
+
 /// A cache made ready for one estimator.
 pub struct Gatherer {
     attempted: u32,
     prepared: Prepared,
-    error: f32,
+    tuning: Tuning,
 }
 
 enum Prepared {
     Notes(Cache),
-    All(Columns),
-    Cut(Tree),
+    Thinned(Box<Thinning>),
+    All(Box<Columns>),
+    Cut(Box<Cutting>),
+}
+
+/// A tree, and what stands for its nodes where no random member does.
+struct Cutting {
+    tree: Tree,
+    clusters: Option<Columns>,
 }
 
 /// Working space of one task, for one model after the other.
@@ -40,45 +65,69 @@ impl Scratch {
 }
 
 impl Gatherer {
-    /// Builds what `estimator` needs. `error` is the largest share of the sum that one node of a `cut` may be wrong by.
-    pub fn new(estimator: Estimator, cache: Cache, model: &Model, error: f32) -> Self {
+    /// Builds what `estimator` needs.
+    pub fn new(estimator: Estimator, cache: Cache, model: &Model, tuning: Tuning) -> Self {
         let attempted = cache.attempted.max(1);
+        let plain = cache.lit.len() <= PLAIN_SUM;
         let prepared = match estimator {
             Estimator::Notes => Prepared::Notes(cache),
-            Estimator::Cut if cache.lit.len() > PLAIN_SUM => Prepared::Cut(Tree::new(&Columns::of(model, &cache.lit))),
-            Estimator::All | Estimator::Cut => Prepared::All(Columns::of(model, &cache.lit)),
+            Estimator::Thinned => Prepared::Thinned(Box::new(Thinning::new(model, cache))),
+            Estimator::Cut | Estimator::Cluster if !plain => {
+                let tree = Tree::new(&Columns::of(model, &cache.lit));
+                let clusters = (estimator == Estimator::Cluster).then(|| tree.clusters(model));
+                Prepared::Cut(Box::new(Cutting { tree, clusters }))
+            }
+            Estimator::All | Estimator::Cut | Estimator::Cluster => {
+                Prepared::All(Box::new(Columns::of(model, &cache.lit)))
+            }
         };
-        Self { attempted, prepared, error }
+        Self { attempted, prepared, tuning }
     }
 
-    /// (1/M) Σ S_d L_t to `exit`. `key` seeds what is random; the same arguments give the same bits.
+    /// (1/M) Σ S_d L_t to each of `exits`, into `out`. `keys`, one for each exit, seed what is random; the same arguments
+    /// give the same bits.
     pub fn gather(
         &self,
-        model: &Model,
-        envelope: &Envelope,
-        exit: &Exit,
-        key: u64,
+        (model, envelope): (&Model, &Envelope),
+        exits: &[Exit],
+        keys: &[u64],
         scratch: &mut Scratch,
         tally: &mut GatherTally,
-    ) -> Rgb {
-        let sum = match &self.prepared {
-            Prepared::Notes(cache) => return model.visit(Notes { cache, exit, key, tally }),
+        out: &mut Vec<Rgb>,
+    ) {
+        out.clear();
+        tally.exits += exits.len() as u64;
+        let Tuning { error, floor, partition } = self.tuning;
+        let attempted = f64::from(self.attempted);
+        let mean = |sum: [f64; 3]| Rgb::from_fn(|c| (sum[c] / attempted) as f32);
+        let each = exits.iter().zip(keys);
+        match &self.prepared {
+            Prepared::Notes(cache) => {
+                out.extend(each.map(|(exit, &key)| model.visit(Notes { cache, exit, key, tally })));
+            }
+            Prepared::Thinned(thinning) => {
+                out.extend(each.map(|(exit, &key)| model.visit(Thinned { thinning, exit, key, tally })));
+            }
             Prepared::All(columns) => {
-                let count = columns.len() as u64;
+                let count = columns.len() as u64 * exits.len() as u64;
                 tally.pairs += count;
                 tally.evaluated += count;
-                columns.sum(model, exit)
+                let mut sum = |exit| columns.sum(model, exit, partition, &mut tally.clamped);
+                out.extend(exits.iter().map(|exit| mean(sum(exit))));
             }
-            Prepared::Cut(tree) => {
-                let (sum, work) = cut(tree, model, envelope, exit, self.error, key, scratch.buffer(model));
+            Prepared::Cut(cutting) => {
+                let Cutting { tree, clusters } = &**cutting;
+                let mut sums = vec![[0.0; 3]; exits.len()];
+                let floor = floor * attempted as f32;
+                let cut = Cut { tree, clusters: clusters.as_ref(), model, envelope, error, floor, partition };
+                let work = cut.sums(exits, keys, scratch.buffer(model), &mut sums);
                 tally.nodes += work.nodes;
                 tally.pairs += work.evaluated;
                 tally.evaluated += work.evaluated;
-                sum
+                tally.clamped += work.clamped;
+                out.extend(sums.into_iter().map(mean));
             }
-        };
-        tally.exits += 1;
-        Rgb::from_fn(|c| (sum[c] / f64::from(self.attempted)) as f32)
+        }
     }
 }
 
@@ -93,5 +142,19 @@ impl ModelVisitor for Notes<'_> {
     type Out = Rgb;
     fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
         notes(self.cache, model, self.exit, self.key, self.tally)
+    }
+}
+
+struct Thinned<'a> {
+    thinning: &'a Thinning,
+    exit: &'a Exit,
+    key: u64,
+    tally: &'a mut GatherTally,
+}
+
+impl ModelVisitor for Thinned<'_> {
+    type Out = Rgb;
+    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
+        thinned(self.thinning, model, self.exit, self.key, self.tally)
     }
 }

@@ -1,6 +1,6 @@
 //! Filling the cache: random triangle by area, random point in it, a direction, what light arrives, what enters.
 
-use super::{Cache, CachedSample};
+use super::{Cache, CachedSample, Density};
 use crate::bssrdf::{Entry, Model};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Arrival, Lights, emitted};
@@ -30,8 +30,12 @@ pub struct Filler<'a> {
     pub eta: f32,
     /// How directions are picked.
     pub sampling: EntrySampling,
+    /// Share of the directions picked by the cosine where lights are sampled; see [`Lights::cosine_share`].
+    pub cosine_share: f32,
     /// The object's long stream of points.
     pub stream: &'a CacheStream,
+    /// How the points are spread over the surface.
+    pub density: &'a Density,
 }
 
 /// Samples filled by one task; their shadow rays form one batch.
@@ -62,46 +66,82 @@ impl Filler<'_> {
         Cache { lit, attempted: count }
     }
 
+    /// The first `count` samples of the stream that meet light, each with its place along the area table.
+    pub fn pilots(&self, count: u32) -> Vec<(f64, CachedSample)> {
+        let lit = |number: u64| {
+            let (at, weight, u) = self.point(number);
+            let place = self.density.place(self.stream.numbers(number).0).0;
+            let (sample, shadow) = self.entering(at, weight, u, &mut RayTally::default())?;
+            let hidden = shadow.is_some_and(|ray| self.rays.occluded(&ray));
+            (sample.is_finite() && !hidden).then_some((place, sample))
+        };
+        (0..u64::from(count)).into_par_iter().filter_map(lit).collect()
+    }
+
     /// Candidates first, then all their shadow rays at once.
     fn by_light(&self, numbers: std::ops::Range<u64>, tally: &mut RayTally) -> Vec<CachedSample> {
         let mut candidates = Vec::with_capacity(CHUNK as usize);
         for number in numbers {
-            let (at, u) = self.point(number);
-            let Some(arrival) = self.arrival(&at, [u[0], u[1], u[2], u[3]]) else { continue };
-            if let Some(sample) = self.transmitted(&at, &arrival, u[4]) {
-                candidates.push((sample, arrival.shadow));
-            }
+            let (at, weight, u) = self.point(number);
+            candidates.extend(self.entering(at, weight, u, tally));
         }
-        let shadows: Vec<Ray> = candidates.iter().map(|(_, ray)| *ray).collect();
+        let shadows: Vec<Ray> = candidates.iter().filter_map(|(_, ray)| *ray).collect();
         let mut occluded = vec![false; shadows.len()];
         self.rays.occluded_batch(&shadows, &mut occluded);
         tally.shadow += shadows.len() as u64;
-        candidates.into_iter().zip(occluded).filter(|(_, hidden)| !hidden).map(|((sample, _), _)| sample).collect()
+        let mut occluded = occluded.into_iter();
+        candidates.retain(|(_, ray)| ray.is_none() || occluded.next() == Some(false));
+        candidates.into_iter().map(|(sample, _)| sample).collect()
     }
 
-    /// One arrival from whichever kinds of light there are; each kind stands for its share of the samples.
-    fn arrival(&self, at: &SurfacePoint, u: [f32; 4]) -> Option<Arrival> {
-        match (self.lights.has_emitters(), self.lights.has_environment()) {
-            (false, false) => None,
-            (true, false) => self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]]),
-            (false, true) => self.lights.sample_environment(at, [u[1], u[2]]),
-            (true, true) => {
-                let mut arrival = if u[3] < 0.5 {
-                    self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]])
-                } else {
-                    self.lights.sample_environment(at, [u[1], u[2]])
-                }?;
-                arrival.irradiance *= 2.0;
-                Some(arrival)
-            }
+    /// Light that enters at `at`, a point with one over its density `weight` [unit²], if nothing stands on the ray beside it.
+    pub fn entering(
+        &self,
+        at: SurfacePoint,
+        weight: f32,
+        u: [f32; 5],
+        tally: &mut RayTally,
+    ) -> Option<(CachedSample, Option<Ray>)> {
+        // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
+        let at = SurfacePoint { n: at.n_geometric, ..at };
+        let (arrival, open) = self.arrival(&at, [u[0], u[1], u[2], u[3]], tally)?;
+        let sample = self.transmitted(&at, weight, &arrival, u[4])?;
+        Some((sample, (!open).then_some(arrival.shadow)))
+    }
+
+    /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
+    /// and some by the cosine, each counts over the density of both [Vea97], the balance heuristic.
+    fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut RayTally) -> Option<(Arrival, bool)> {
+        let share = self.cosine_share;
+        if !self.lights.has_emitters() {
+            return if self.lights.has_environment() {
+                Some((self.lights.sample_environment(at, [u[1], u[2]])?, false))
+            } else {
+                None
+            };
         }
+        if u[3] >= share {
+            let mut arrival = self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]])?;
+            arrival.irradiance *= 1.0 / ((1.0 - share) + share * at.n.dot(arrival.w) / PI / arrival.pdf_angle);
+            return Some((arrival, false));
+        }
+        let (w, ray) = Lights::look_up(at, [u[1], u[2]])?;
+        let cosine = at.n.dot(w) / PI;
+        tally.bounce += 1;
+        let (radiance, by_light) = match self.rays.closest(&ray) {
+            Some(hit) => (emitted(self.scene, &hit, w), self.lights.pdf_angle(self.scene, &hit, w)),
+            None => (self.lights.environment(), 0.0),
+        };
+        let pdf_angle = share * cosine + (1.0 - share) * by_light;
+        let irradiance = radiance * (at.n.dot(w) / pdf_angle);
+        Some((Arrival { w, irradiance, pdf_angle, shadow: ray }, true))
     }
 
     /// Cosine-sampled directions, followed to whatever shines there.
     fn by_cosine(&self, numbers: std::ops::Range<u64>, tally: &mut RayTally) -> Vec<CachedSample> {
         let mut lit = Vec::new();
         for number in numbers {
-            let (at, u) = self.point(number);
+            let (at, weight, u) = self.point(number);
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { continue };
             tally.bounce += 1;
             let radiance = match self.rays.closest(&ray) {
@@ -109,27 +149,34 @@ impl Filler<'_> {
                 None => self.lights.environment(),
             };
             if !radiance.is_black() {
-                lit.extend(self.transmitted(&at, &Arrival { w, irradiance: radiance * PI, shadow: ray }, u[4]));
+                lit.extend(self.transmitted(
+                    &at,
+                    weight,
+                    &Arrival { w, irradiance: radiance * PI, pdf_angle: at.n.dot(w) / PI, shadow: ray },
+                    u[4],
+                ));
             }
         }
         lit
     }
 
-    /// Point number `number` of the surface, flat as the triangle it lies on, four numbers for the light and one for the depth.
-    fn point(&self, number: u64) -> (SurfacePoint, [f32; 5]) {
+    /// Point number `number` of the surface, flat as the triangle it lies on, area over its density, four numbers for the
+    /// light and one for the depth.
+    fn point(&self, number: u64) -> (SurfacePoint, f32, [f32; 5]) {
         let (pick, u) = self.stream.numbers(number);
+        let (pick, weight) = self.density.place(pick);
         let at = self.table.sample(pick, [u[0], u[1]]);
         let mut point = self.scene.objects[self.object as usize].mesh.point(at.triangle, at.u, at.v);
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         point.n = point.n_geometric;
-        (point, [u[2], u[3], u[4], u[5], u[6]])
+        (point, weight * self.table.area() as f32, [u[2], u[3], u[4], u[5], u[6]])
     }
 
-    /// Refracts an arrival into the medium; `None` where it is totally reflected.
-    fn transmitted(&self, at: &SurfacePoint, arrival: &Arrival, u: f32) -> Option<CachedSample> {
+    /// Refracts an arrival into the medium; `weight` is one over the density of the point [unit²]. `None` where it is totally reflected.
+    fn transmitted(&self, at: &SurfacePoint, weight: f32, arrival: &Arrival, u: f32) -> Option<CachedSample> {
         let w = refract(arrival.w, at.n, self.eta)?;
         let t12 = transmittance(self.eta, arrival.w.dot(at.n));
-        let flux: Rgb = arrival.irradiance * (t12 * self.table.area() as f32);
+        let flux: Rgb = arrival.irradiance * (t12 * weight);
         (!flux.is_black()).then(|| CachedSample {
             entry: Entry { x: at.x, n: at.n, w },
             depth: self.model.sample_depth(u),

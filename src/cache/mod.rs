@@ -3,20 +3,26 @@
 
 mod columns;
 mod cut;
+mod density;
 mod envelope;
 mod estimate;
 mod fill;
+mod near;
 mod notes;
+mod thinned;
 mod tree;
 
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
 pub use columns::Columns;
-pub use cut::{Buffer, CutWork, cut};
+pub use cut::{Buffer, Cut, CutWork};
+pub use density::{Density, Seen, Survey, seen};
 pub use envelope::{Envelope, Fall};
-pub use estimate::{Gatherer, PLAIN_SUM, Scratch};
+pub use estimate::{Gatherer, PLAIN_SUM, Scratch, Tuning};
 pub use fill::Filler;
+pub use near::NearField;
 pub use notes::notes;
+pub use thinned::{Thinning, thinned};
 pub use tree::{Node, Tree};
 
 /// The cached samples of one object and one pass. Samples that met no light are not stored, but count.
@@ -40,8 +46,17 @@ pub struct CachedSample {
     pub flux: Rgb,
 }
 
+impl CachedSample {
+    /// True where no number is NaN or infinite: one that is would spoil the gathering at every exit of the pass.
+    pub fn is_finite(&self) -> bool {
+        let Entry { x, n, w } = self.entry;
+        x.is_finite() && n.is_finite() && w.is_finite() && self.depth.is_finite() && self.flux.is_finite()
+    }
+}
+
 /// What gathering cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct GatherTally {
     /// Samples attempted by all fills.
     pub samples: u64,
@@ -53,8 +68,14 @@ pub struct GatherTally {
     pub nodes: u64,
     /// Pairs of exit point and cached sample looked at.
     pub pairs: u64,
+    /// Points of the near field found for an exit, where S_d was evaluated.
+    pub near: u64,
     /// Pairs where S_d was evaluated: those kept by rejection control, all of a plain sum, or those in a cut.
     pub evaluated: u64,
+    /// Samples left out because a number of theirs is NaN or infinite.
+    pub non_finite: u64,
+    /// Values of S_d below zero that were taken as 0, one for each pair and channel.
+    pub clamped: u64,
 }
 
 impl std::ops::AddAssign for GatherTally {
@@ -65,5 +86,8 @@ impl std::ops::AddAssign for GatherTally {
         self.nodes += other.nodes;
         self.pairs += other.pairs;
         self.evaluated += other.evaluated;
+        self.near += other.near;
+        self.non_finite += other.non_finite;
+        self.clamped += other.clamped;
     }
 }

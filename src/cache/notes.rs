@@ -10,18 +10,19 @@ use crate::math::{Rgb, hash};
 pub fn notes<B: Bssrdf>(cache: &Cache, model: &B, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
     let decay = model.decay();
     let mut sum = [0.0_f64; 3];
-    let mut evaluated = 0;
+    let (mut evaluated, clamps) = (0, model.clamps());
     for (number, sample) in cache.lit.iter().enumerate() {
         let distance = sample.entry.x.distance(exit.x);
         if chance(key, number) < f64::from((-decay * distance).exp()) {
             evaluated += 1;
-            let light = model.eval_cached(&sample.entry, sample.depth, exit, decay) * sample.flux;
+            let s = model.eval_cached(&sample.entry, sample.depth, exit, decay);
+            let light = s * sample.flux;
             for c in 0..3 {
+                tally.clamped += u64::from(clamps && s[c] == 0.0 && sample.flux[c] > 0.0);
                 sum[c] += f64::from(light[c]);
             }
         }
     }
-    tally.exits += 1;
     tally.pairs += cache.lit.len() as u64;
     tally.evaluated += evaluated;
     Rgb::from_fn(|c| (sum[c] / f64::from(cache.attempted.max(1))) as f32)

@@ -1,6 +1,7 @@
 //! A binary tree over the samples of one pass, split at medians, in the order in which it is walked.
 
 use super::Columns;
+use crate::bssrdf::Model;
 use crate::math::{Vec3, Vec4};
 
 /// Samples of a leaf, but for the last.
@@ -51,6 +52,11 @@ pub struct Tree {
 impl Tree {
     /// A tree over `samples`, built in parallel; the same for any number of threads.
     pub fn new(samples: &Columns) -> Self {
+        Self::ordered(samples).0
+    }
+
+    /// The tree, and which sample each of its own is.
+    pub fn ordered(samples: &Columns) -> (Self, Vec<u32>) {
         let count = samples.len();
         let mut total = [0.0_f64; 3];
         for i in 0..count {
@@ -77,7 +83,14 @@ impl Tree {
         }
         let mut tree = Self { columns, nodes, cumulative };
         tree.measure();
-        tree
+        (tree, order)
+    }
+
+    /// One sample for each node, in their order: the mean of its members, as they are drawn, with their whole weight.
+    pub fn clusters(&self, model: &Model) -> Columns {
+        let mass = |i: usize| self.cumulative[i + 1] - self.cumulative[i];
+        let ranges = self.nodes.iter().map(|n| n.first as usize..(n.first + n.count) as usize);
+        self.columns.means(model, ranges, mass)
     }
 
     /// Bytes of nodes, tables and columns.

@@ -2,12 +2,12 @@
 
 use super::setup::{MethodArgs, prepare};
 use marmor::Result;
-use marmor::film::Film;
-use marmor::geometry::Mesh;
+use marmor::film::{Film, write_atomically};
+use marmor::geometry::{Mended, Mesh, load_obj, mended, write_obj};
 use marmor::optics::Medium;
-use marmor::scene::{Scene, Surface};
+use marmor::scene::{Geometry, Scene, Surface};
 use serde_json::{Value, json};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 #[derive(clap::Args)]
@@ -16,6 +16,9 @@ pub struct Args {
     scene: PathBuf,
     #[command(flatten)]
     method: MethodArgs,
+    /// Write a mended OBJ file of each mesh that can be mended into this folder, under the object's name
+    #[arg(long, value_name = "FOLDER")]
+    write_mended: Option<PathBuf>,
     /// Print one JSON object instead of a text
     #[arg(long)]
     json: bool,
@@ -23,11 +26,17 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let prepared = prepare(&args.scene, &args.method)?;
+    let prepared = prepare(args.method.read(&args.scene)?, &args.method)?;
     let scene = &prepared.scene;
+    if let Some(folder) = &args.write_mended {
+        write_mended(&prepared, folder)?;
+    }
     let parts = prepared.method.parts(scene);
     let [width, height] = scene.camera.resolution;
-    let film_bytes = width as usize * height as usize * Film::BYTES_PER_PIXEL;
+    let pixels = width as usize * height as usize;
+    let film_bytes = pixels * Film::BYTES_PER_PIXEL;
+    let picture_bytes = pixels * BYTES_PER_PIXEL_OF_PICTURES;
+    let available = marmor::memory::available();
     if args.json {
         let objects: Vec<Value> = scene.objects.iter().map(|o| object_json(scene, o)).collect();
         let report = json!({
@@ -39,13 +48,22 @@ pub fn run(args: Args) -> Result<ExitCode> {
             "objects": objects,
             "parts": parts,
             "film_bytes": film_bytes,
+            "picture_bytes": picture_bytes,
+            "available_bytes": available,
             "warnings": scene.warnings,
         });
         println!("{report:#}");
         return Ok(ExitCode::SUCCESS);
     }
     let unit = scene.unit_in_mm.map_or("unit not declared".into(), |mm| format!("1 unit = {mm} mm"));
-    println!("{}: {unit}, {width}x{height} pixels (film {:.1} MB)", scene.name, film_bytes as f64 / 1e6);
+    println!("{}: {unit}, {width}x{height} pixels", scene.name);
+    println!(
+        "memory: film {:.1} MB, passes and pictures {:.1} MB, meshes {:.1} MB; available {}",
+        film_bytes as f64 / 1e6,
+        picture_bytes as f64 / 1e6,
+        scene.objects.iter().map(|o| o.mesh.bytes()).sum::<usize>() as f64 / 1e6,
+        available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
+    );
     println!("method {} on backend {}", prepared.method.name(), prepared.backend.name());
     println!("\nobjects");
     for object in &scene.objects {
@@ -61,6 +79,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
             material.name,
             describe(&material.surface)
         );
+        for remark in scene.remarks(object) {
+            println!("    {}: {}", if remark.warns { "warning" } else { "note" }, remark.text);
+        }
     }
     for (built, title) in [(true, "built"), (false, "left out")] {
         println!("\n{title}");
@@ -75,6 +96,34 @@ pub fn run(args: Args) -> Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Samples of a pass, the picture, and what goes into an EXR file, beside the film.
+const BYTES_PER_PIXEL_OF_PICTURES: usize = 4 * size_of::<marmor::math::Rgb>();
+
+/// Writes mended meshes, in their own space: before the object's transform, after its `flip`.
+fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> {
+    let scene_folder = prepared.file.path.parent().unwrap_or(Path::new(""));
+    for entry in &prepared.file.objects {
+        let Geometry::Mesh(path) = &entry.geometry else { continue };
+        let mesh = load_obj(&scene_folder.join(path))?;
+        let (mesh, done) = mended(if entry.flip { mesh.flipped() } else { mesh });
+        if done == Mended::default() {
+            continue;
+        }
+        let name: String = entry.name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
+        let target = folder.join(format!("{name}.obj"));
+        write_atomically(&target, |out| write_obj(&mesh, out))?;
+        eprintln!(
+            "wrote {}: {} triangles without area and {} repeated ones removed, {} turned{}",
+            target.display(),
+            done.zero_area,
+            done.duplicates,
+            done.turned,
+            if entry.flip { "; remove `flip` from the object" } else { "" }
+        );
+    }
+    Ok(())
 }
 
 /// Area [unit²] and edges of the bounding box [unit].
@@ -114,5 +163,7 @@ fn object_json(scene: &Scene, object: &marmor::scene::Object) -> Value {
         "size": size,
         "material": material.name,
         "surface": describe(&material.surface),
+        "findings": object.findings,
+        "remarks": scene.remarks(object),
     })
 }

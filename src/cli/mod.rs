@@ -1,13 +1,33 @@
 //! Words on a command line -> calls into the library; the only code that prints or exits.
 //! Not for: anything that computes. Read first: `render.rs`, the program's table of contents.
 
+/// Prints a line to standard error. Whoever closed it, with a terminal or a pipe, must not end a render: the standard
+/// library's macro would panic.
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr(), $($text)*);
+    }};
+}
+/// The same for standard output.
+macro_rules! println {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}
+
 mod check;
 mod diff;
 mod eval;
+mod keep;
 mod materials;
+mod merge;
 mod observers;
+mod outputs;
 mod profile;
 mod render;
+mod replay;
 mod setup;
 mod stats;
 
@@ -26,6 +46,8 @@ struct Cli {
 enum Command {
     /// Render a scene to EXR and PNG
     Render(render::Args),
+    /// Join parts of one render, bit for bit
+    Merge(merge::Args),
     /// Say what is in a scene, what will be built and what is left out
     Check(check::Args),
     /// Compare two pictures: RMSE and relative error with 95 % intervals
@@ -45,6 +67,7 @@ pub const INTERRUPTED: u8 = 75;
 pub fn main() -> ExitCode {
     let outcome: Result<ExitCode> = match Cli::parse().command {
         Command::Render(args) => render::run(args),
+        Command::Merge(args) => merge::run(args),
         Command::Check(args) => check::run(args),
         Command::Diff(args) => diff::run(args),
         Command::Profile(args) => profile::run(args),

@@ -3,10 +3,13 @@
 use indicatif::{ProgressBar, ProgressStyle};
 use marmor::Result;
 use marmor::film::Image;
-use marmor::film::metrics;
+use marmor::film::metrics::{self, Estimate};
+use marmor::film::{SelfError, SelfErrors};
 use marmor::render::{Observer, Progress};
 use marmor::report::{ErrorFigures, Record, RecordFile};
+use std::cell::Cell;
 use std::io::IsTerminal;
+use std::rc::Rc;
 use std::time::Duration;
 
 /// How much is said on standard error.
@@ -20,8 +23,69 @@ pub enum Verbosity {
     Verbose,
 }
 
-/// A bar with elapsed and remaining time on a terminal; a line at each tenth elsewhere.
-pub enum ProgressDisplay {
+/// The newest error that the render told of itself, and what is asked: for the bar, the records and the end.
+#[derive(Clone, Default)]
+pub struct OwnError(Rc<Cell<Option<SelfErrors>>>);
+
+impl OwnError {
+    /// The whole estimate.
+    pub fn get(&self) -> Option<SelfErrors> {
+        self.0.get()
+    }
+
+    /// Its relMSE.
+    pub fn relmse(&self) -> Option<Estimate> {
+        self.0.get().and_then(|e| e.relmse)
+    }
+}
+
+/// Measures the error from the halves of the film and stops the render when it is small enough. Goes before the
+/// observers that show it.
+pub struct Measure {
+    /// Each pass has its record, so each is measured.
+    pub each_pass: bool,
+    /// Stop at this relMSE.
+    pub target: Option<f64>,
+    told: OwnError,
+    error: SelfError,
+    next: u32,
+}
+
+/// Passes before an error is trusted to end a render.
+const FEWEST_PASSES: u32 = 8;
+
+impl Measure {
+    /// Tells `told`.
+    pub fn new(told: OwnError, each_pass: bool, target: Option<f64>) -> Self {
+        Self { each_pass, target, told, error: SelfError::new(), next: 2 }
+    }
+}
+
+impl Observer for Measure {
+    fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()> {
+        let passes = progress.film.passes();
+        if self.each_pass || passes >= self.next {
+            self.told.0.set(self.error.measure(progress.film));
+            // Measuring costs some milliseconds; steps of 2 % do for a bar and a target.
+            self.next = passes + 1 + passes / 50;
+        }
+        Ok(())
+    }
+
+    fn satisfied(&self) -> bool {
+        let fresh = self.next > FEWEST_PASSES;
+        self.target.zip(self.told.relmse()).is_some_and(|(target, told)| fresh && told.value <= target)
+    }
+}
+
+/// A bar with elapsed and remaining time and the error on a terminal; a line at each tenth elsewhere.
+pub struct ProgressDisplay {
+    shown: Shown,
+    own: OwnError,
+    target: Option<f64>,
+}
+
+enum Shown {
     /// `-q`.
     Silent,
     /// A terminal.
@@ -31,58 +95,66 @@ pub enum ProgressDisplay {
 }
 
 impl ProgressDisplay {
-    /// Whatever standard error can show.
-    pub fn new(verbosity: Verbosity) -> Self {
-        if verbosity == Verbosity::Quiet {
-            return Self::Silent;
-        }
-        if !std::io::stderr().is_terminal() {
-            return Self::Lines(0);
-        }
-        let bar = ProgressBar::new(1000);
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {msg}") {
-            bar.set_style(style);
-        }
-        Self::Bar(bar)
+    /// Whatever standard error can show; `target` is the relMSE to reach.
+    pub fn new(verbosity: Verbosity, own: OwnError, target: Option<f64>) -> Self {
+        let shown = if verbosity == Verbosity::Quiet {
+            Shown::Silent
+        } else if std::io::stderr().is_terminal() {
+            let bar = ProgressBar::new(1000);
+            if let Ok(style) = ProgressStyle::with_template("{bar:30} {msg}") {
+                bar.set_style(style);
+            }
+            Shown::Bar(bar)
+        } else {
+            Shown::Lines(0)
+        };
+        Self { shown, own, target }
     }
 
     /// Takes the bar off the screen.
     pub fn finish(&self) {
-        if let Self::Bar(bar) = self {
+        if let Shown::Bar(bar) = &self.shown {
             bar.finish_and_clear();
         }
+    }
+
+    /// The share of the job that is done, by whichever limit comes first; an error falls as one over the passes.
+    fn fraction_done(&self, progress: &Progress<'_>) -> f64 {
+        let by_passes = progress.job.passes.map_or(0.0, |n| f64::from(progress.film.passes()) / f64::from(n));
+        let by_time = progress.job.time.map_or(0.0, |t| progress.seconds.total() / t.as_secs_f64());
+        let by_error = self.target.zip(self.own.relmse()).map_or(0.0, |(target, own)| target / own.value);
+        by_passes.max(by_time).max(by_error).min(1.0)
     }
 }
 
 impl Observer for ProgressDisplay {
     fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()> {
-        let done = fraction_done(progress);
+        let done = self.fraction_done(progress);
         let passes = progress.film.passes();
         let elapsed = progress.seconds.total();
-        let left = elapsed * (1.0 / done.max(1e-9) - 1.0);
-        match self {
-            Self::Silent => {}
-            Self::Bar(bar) => {
+        let error = self.own.relmse().map_or(String::new(), |e| {
+            let wanted = self.target.map_or(String::new(), |t| format!(" of {t:.1e}"));
+            format!(", relMSE {:.1e}{wanted}", e.value)
+        });
+        // Before anything is known of an error to reach there is no time left to tell.
+        let left = if done > 0.0 { format!("{} left", clock(elapsed * (1.0 / done - 1.0))) } else { "? left".into() };
+        let line = format!("pass {passes}, {} elapsed, {left}{error}", clock(elapsed));
+        match &mut self.shown {
+            Shown::Silent => {}
+            Shown::Bar(bar) => {
                 bar.set_position((done * 1000.0) as u64);
-                bar.set_message(format!("pass {passes}, {} elapsed, {} left", clock(elapsed), clock(left)));
+                bar.set_message(line);
             }
-            Self::Lines(told) => {
+            Shown::Lines(told) => {
                 let tenth = (done * 10.0) as u32;
                 if tenth > *told {
                     *told = tenth;
-                    eprintln!("{:3} % pass {passes}, {} elapsed, {} left", tenth * 10, clock(elapsed), clock(left));
+                    eprintln!("{:3} % {line}", tenth * 10);
                 }
             }
         }
         Ok(())
     }
-}
-
-/// The share of the job that is done, by whichever limit comes first.
-fn fraction_done(progress: &Progress<'_>) -> f64 {
-    let by_passes = progress.job.passes.map_or(0.0, |n| f64::from(progress.film.passes()) / f64::from(n));
-    let by_time = progress.job.time.map_or(0.0, |t| progress.seconds.total() / t.as_secs_f64());
-    by_passes.max(by_time).min(1.0)
 }
 
 /// Seconds as a person reads them.
@@ -103,6 +175,8 @@ pub struct Records {
     pub seconds_setup: f64,
     /// What to measure against.
     pub reference: Option<Image>,
+    /// What the render tells of itself.
+    pub own: OwnError,
 }
 
 impl Observer for Records {
@@ -122,8 +196,9 @@ impl Observer for Records {
             rays: progress.tally.rays,
             gather: progress.tally.gather,
             error,
+            own: self.own.get().as_ref().map(Into::into),
             non_finite: 0,
-            clamped: 0,
+            clamped: progress.tally.gather.clamped,
             negative: 0,
         };
         self.file.append(&record.with_counts(&progress.film.counts()))

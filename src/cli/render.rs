@@ -1,46 +1,58 @@
 //! `marmor render`: from a scene file to pictures. Reads in the order it runs.
 
 use super::INTERRUPTED;
-use super::observers::{ProgressDisplay, Records, Verbosity, error_figures};
+use super::keep::{KeepArgs, Keeper, cancel_on_signals};
+use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
+use super::outputs::{LayerName, Outputs};
+use super::replay;
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
-use marmor::film::{Attribute, Film, Image, Metadata, PngOptions, Window, check_writable, save, source_date_epoch};
+use marmor::film::{Film, Format, Image, Window, check_writable};
 use marmor::integrator::{Integrator, View};
 use marmor::query;
-use marmor::render::{self, Job, Observer, Outcome, Stop};
+use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
 use marmor::report::RecordFile;
-use marmor::{Error, Result};
+use marmor::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// Samples per pixel where neither scene nor options say.
 const DEFAULT_SPP: u32 = 64;
 
+/// More threads than any machine has processors.
+const MOST_THREADS: usize = 4096;
+
 #[derive(clap::Args)]
 pub struct Args {
     /// The scene file
     scene: PathBuf,
-    /// Where to write; the ending .exr or .png decides the format; may be given more than once
-    /// [default: NAME.exr and NAME.png here, after the scene]
+    /// Where to write; the ending .exr, .png or .film decides the format; may be given more than once
+    /// [default: NAME.exr and NAME.png here, after the scene; with --samples-range NAME.A-B.film]
     #[arg(short, long, value_name = "FILE")]
     output: Vec<PathBuf>,
     #[command(flatten)]
     method: MethodArgs,
+    #[command(flatten)]
+    keep: KeepArgs,
     /// Samples per pixel [default: the scene's, else 64]
     #[arg(long, value_name = "N")]
     spp: Option<u32>,
     /// Stop after this time of rendering, such as 30s, 5m or 500ms
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<Duration>,
+    /// Stop when the estimated relMSE is down to this, such as 1e-3
+    #[arg(long, value_name = "E", value_parser = positive)]
+    target_error: Option<f64>,
     /// Threads [default: one for each core]
     #[arg(long, value_name = "N")]
     threads: Option<usize>,
     /// Render these pixels only: x0,y0,x1,y1, the last two exclusive
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = window)]
     crop: Option<Window>,
+    /// Further layers in the EXR, separated by commas: variance
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    layers: Vec<LayerName>,
     /// Brighten or darken the PNG by this many stops [default: the scene's, else 0]
     #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
     exposure: Option<f64>,
@@ -53,6 +65,15 @@ pub struct Args {
     /// Write what was built, what it cost and how fast it went
     #[arg(long, value_name = "JSON")]
     stats: Option<PathBuf>,
+    /// Exit with code 5 if any contribution was not finite, negative, clamped or dropped; the pictures are written
+    #[arg(long)]
+    strict: bool,
+    /// Print one sample of this pixel and what it meets, instead of rendering; see --pass
+    #[arg(long, value_name = "X,Y", value_parser = pixel)]
+    pixel: Option<[u32; 2]>,
+    /// The pass of --pixel, from 0
+    #[arg(long, value_name = "N", requires = "pixel", default_value_t = 0)]
+    pass: u32,
     /// Say what was built and what was left out
     #[arg(short, long)]
     verbose: bool,
@@ -69,19 +90,32 @@ pub fn run(args: Args) -> Result<ExitCode> {
         (_, true) => Verbosity::Verbose,
         _ => Verbosity::Normal,
     };
-    let outputs = if args.output.is_empty() { default_outputs(&args.scene) } else { args.output.clone() };
-    for path in &outputs {
-        check_writable(path)?;
+    let outputs = if args.output.is_empty() { default_outputs(&args) } else { args.output.clone() };
+    if args.pixel.is_none() {
+        outputs.iter().try_for_each(|path| check_writable(path))?;
+        args.keep.check(&outputs)?;
+    }
+    let is_film = |path: &PathBuf| Format::of(path).is_ok_and(|format| format == Format::Film);
+    if args.keep.samples_range.is_some() && args.pixel.is_none() && !outputs.iter().any(is_film) {
+        eprintln!("warning: `marmor merge` needs film files: add -o NAME.film");
     }
     let reference = args.reference.as_deref().map(Image::read_exr).transpose()?;
     let mut builder = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
+        if threads > MOST_THREADS {
+            return Err(Error::usage(format!("--threads {threads}: at most {MOST_THREADS}")));
+        }
         builder = builder.num_threads(threads.max(1));
     }
     let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;
 
     pool.install(|| {
-        let prepared = prepare(&args.scene, &args.method)?;
+        let file = args.method.read(&args.scene)?;
+        let resolution = file.camera.resolution;
+        let window = args.crop.unwrap_or(Window::full(resolution));
+        // Before meshes are read, which may take long.
+        Film::require_memory(window)?;
+        let prepared = prepare(file, &args.method)?;
         let scene = &prepared.scene;
         for warning in &scene.warnings {
             if verbosity > Verbosity::Quiet {
@@ -91,16 +125,27 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
         let rays = query::build(prepared.backend, &meshes)?;
         let view = View { scene, rays: &*rays };
-        let resolution = scene.camera.resolution;
-        let mut film = Film::new(resolution, args.crop.unwrap_or(Window::full(resolution)))?;
         let cancel = cancel_on_signals();
         let job = Job {
             seed: prepared.seed,
-            passes: Some(args.spp.or(prepared.file.render.spp).unwrap_or(DEFAULT_SPP))
-                .filter(|_| args.spp.is_some() || args.time.is_none()),
+            passes: match &args.keep.samples_range {
+                Some(range) => Some(range.end),
+                None => Some(args.spp.or(prepared.file.render.spp).unwrap_or(DEFAULT_SPP))
+                    .filter(|_| args.spp.is_some() || args.time.is_none() && args.target_error.is_none()),
+            },
             time: args.time,
             cancel: &cancel,
         };
+        if let Some(pixel) = args.pixel {
+            return replay::run(&prepared, view, &job, pixel, args.pass);
+        }
+        let exposure = args.exposure.or(prepared.file.render.exposure).unwrap_or(0.0);
+        let mut outputs = Outputs::new(&prepared, &rays.description(), window, outputs, exposure);
+        outputs.layers.clone_from(&args.layers);
+        let (mut film, spent, mut keeper) = args.keep.start(&outputs, resolution, window, job.passes)?;
+        if film.passes() > 0 && verbosity > Verbosity::Quiet {
+            eprintln!("going on from {} after {} passes", keeper.path.display(), film.passes());
+        }
         let mut task = Task {
             args: &args,
             verbosity,
@@ -108,6 +153,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             reference,
             description: rays.description(),
             effective: prepared.file.effective(),
+            own: OwnError::default(),
         };
         if verbosity > Verbosity::Quiet {
             let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles.len()).sum();
@@ -123,26 +169,27 @@ pub fn run(args: Args) -> Result<ExitCode> {
             );
         }
         let finished = match &prepared.method {
-            Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film)?,
-            Method::Direct(method) => task.run(method, view, &job, &mut film)?,
-            Method::Subsurface(method) => task.run(&**method, view, &job, &mut film)?,
-            Method::VolumePath(method) => task.run(&**method, view, &job, &mut film)?,
+            Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
+            Method::Direct(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
+            Method::Subsurface(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
+            Method::VolumePath(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
         };
         if film.passes() == 0 {
             return Err(Error::usage("0 samples per pixel make no picture; ask for at least 1 with --spp"));
         }
-        let metadata = Metadata {
-            samples_per_pixel: film.passes(),
-            render_seconds: Some(finished.seconds.total()),
-            created: source_date_epoch(),
-            attributes: attributes(&prepared, &film, &task.description),
-        };
-        let exposure = args.exposure.or(prepared.file.render.exposure).unwrap_or(0.0);
-        let image = film.image();
-        for path in &outputs {
-            save(&image, path, &metadata, PngOptions { exposure })?;
+        let spent = Spent { seconds: finished.seconds, tally: finished.tally };
+        let saved = outputs.save(&film, &spent);
+        // Where a picture fails the film file may still come through.
+        let said = saved.map_err(|e| keeper.rescue(e, &film, &spent))?;
+        if verbosity > Verbosity::Quiet {
+            said.iter().for_each(|line| eprintln!("{line}"));
         }
-        task.tell(&finished, &film, &outputs)?;
+        let kept = keeper.finish(finished.stop, &film, &spent)?;
+        let odd = odd(&film, &spent).map(|cause| (cause, replay_line(&args, &film, prepared.seed)));
+        task.tell(&finished, &film, &outputs.paths, kept, odd.as_ref())?;
+        if let Some((cause, replay)) = odd.filter(|_| args.strict) {
+            return Err(Error::new(ErrorKind::Numeric, format!("--strict: {cause}; to look at one: {replay}")));
+        }
         Ok(if finished.stop == Stop::Cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
     })
 }
@@ -155,10 +202,19 @@ struct Task<'a> {
     reference: Option<Image>,
     description: String,
     effective: String,
+    own: OwnError,
 }
 
 impl Task<'_> {
-    fn run<I: Integrator>(&mut self, method: &I, view: View<'_>, job: &Job<'_>, film: &mut Film) -> Result<Outcome> {
+    fn run<I: Integrator>(
+        &mut self,
+        method: &I,
+        view: View<'_>,
+        job: &Job<'_>,
+        film: &mut Film,
+        spent: Spent,
+        keeper: &mut Keeper<'_>,
+    ) -> Result<Outcome> {
         let parts = method.parts(view.scene);
         if self.verbosity == Verbosity::Verbose {
             for part in &parts {
@@ -166,18 +222,22 @@ impl Task<'_> {
             }
         }
         let seconds_setup = self.begin.elapsed().as_secs_f64();
-        let mut display = ProgressDisplay::new(self.verbosity);
+        let (target, each_pass) = (self.args.target_error, self.args.records.is_some());
+        let mut measure = Measure::new(self.own.clone(), each_pass, target);
+        let mut display = ProgressDisplay::new(self.verbosity, self.own.clone(), target);
         let mut records = match &self.args.records {
             Some(path) => {
-                Some(Records { file: RecordFile::create(path)?, seconds_setup, reference: self.reference.clone() })
+                let file = RecordFile::go_on(path, film.passes())?;
+                Some(Records { file, seconds_setup, reference: self.reference.clone(), own: self.own.clone() })
             }
             None => None,
         };
-        let mut observers: Vec<&mut dyn Observer> = vec![&mut display];
+        let mut observers: Vec<&mut dyn Observer> = vec![&mut measure, &mut display];
         if let Some(records) = &mut records {
             observers.push(records);
         }
-        let outcome = render::run(method, view, job, film, &mut observers)?;
+        observers.push(keeper);
+        let outcome = render::resume(method, view, job, film, spent, &mut observers)?;
         display.finish();
         if let Some(path) = &self.args.stats {
             let stats = Stats {
@@ -195,7 +255,14 @@ impl Task<'_> {
     }
 
     /// What came out, in a few lines.
-    fn tell(&self, outcome: &Outcome, film: &Film, outputs: &[PathBuf]) -> Result<()> {
+    fn tell(
+        &self,
+        outcome: &Outcome,
+        film: &Film,
+        outputs: &[PathBuf],
+        kept: Option<&Path>,
+        odd: Option<&(String, String)>,
+    ) -> Result<()> {
         if self.verbosity == Verbosity::Quiet {
             return Ok(());
         }
@@ -210,9 +277,15 @@ impl Task<'_> {
             match outcome.stop {
                 Stop::Passes => "",
                 Stop::Time => "; stopped by --time",
+                Stop::Satisfied => "; reached --target-error",
                 Stop::Cancelled => "; interrupted",
             }
         );
+        if let Some(own) = self.own.relmse() {
+            let interval =
+                own.interval.map_or(String::new(), |[low, high]| format!(" (95 %: {low:.2e} to {high:.2e})"));
+            eprintln!("estimated relMSE {:.2e}{interval}", own.value);
+        }
         if let Some(reference) = &self.reference {
             let e = error_figures(&film.image(), reference)?;
             let relative = e.relmse.map_or(String::new(), |value| format!(", relMSE {value:.4e}"));
@@ -226,40 +299,62 @@ impl Task<'_> {
                 outcome.tally.gather.samples
             );
         }
+        let (lost, walks) = (outcome.tally.walk.lost, outcome.tally.walk.walks);
+        if lost > 0 {
+            eprintln!(
+                "{lost} of {walks} paths inside bodies were lost: they met a hole of a mesh, the wrong side of a face or another \
+                 medium, or rounding put them there; they carry nothing"
+            );
+        }
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         eprintln!("wrote {}", names.join(", "));
-        let counts = film.counts();
-        let replay = counts.first_non_finite.map_or(String::new(), |bad| {
-            let [x, y] = bad.pixel;
-            format!(" (the first: pass {}, --crop {x},{y},{},{})", bad.pass, x + 1, y + 1)
-        });
-        eprintln!(
-            "dropped {} non-finite samples{replay}; {} negative; none clamped",
-            counts.non_finite, counts.negative
-        );
+        if let Some(kept) = kept {
+            eprintln!("wrote {}: the same call with --resume goes on from it", kept.display());
+        }
+        let spent = Spent { seconds: outcome.seconds, tally: outcome.tally };
+        eprintln!("{}", odd_line(film, &spent, odd.map(|(_, replay)| replay.as_str())));
         Ok(())
     }
 }
 
-/// What the EXR header says of its making.
-fn attributes(prepared: &super::setup::Prepared, film: &Film, backend: &str) -> Vec<(String, Attribute)> {
-    let text = |key: &str, value: String| (format!("marmor:{key}"), Attribute::Text(value));
-    let counts = film.counts();
-    let mut list = vec![
-        text("scene", prepared.file.effective()),
-        text("method", prepared.method.name().into()),
-        text("backend", backend.into()),
-        text("seed", prepared.seed.to_string()),
-        text("sampleRange", format!("0..{}", film.passes())),
-        text("nonFinite", counts.non_finite.to_string()),
-        text("negative", counts.negative.to_string()),
+/// The last line of the log: every count of odd contributions, with a call that shows one.
+pub fn odd_line(film: &Film, spent: &Spent, replay: Option<&str>) -> String {
+    let (counts, gather) = (film.counts(), &spent.tally.gather);
+    let replay = replay.map_or(String::new(), |line| format!(" (look at one: {line})"));
+    format!(
+        "dropped {} non-finite samples and {} cached ones; {} negative; {} values of S_d clamped at 0{replay}",
+        counts.non_finite, gather.non_finite, counts.negative, gather.clamped
+    )
+}
+
+/// The causes that `--strict` does not let pass, with their counts.
+fn odd(film: &Film, spent: &Spent) -> Option<String> {
+    let (counts, gather) = (film.counts(), &spent.tally.gather);
+    let causes = [
+        (counts.non_finite, "samples dropped because they are not finite"),
+        (gather.non_finite, "cached samples dropped because they are not finite"),
+        (counts.negative, "samples below zero"),
+        (gather.clamped, "values of S_d clamped at 0"),
     ];
-    list.extend(prepared.method_attributes().into_iter().map(|(key, value)| text(key, value)));
-    list
+    let causes: Vec<String> = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{n} {what}")).collect();
+    (!causes.is_empty()).then(|| causes.join(", "))
+}
+
+/// A call that shows an odd sample: the first that is not finite, or below zero; else any of the first pass.
+fn replay_line(args: &Args, film: &Film, seed: u64) -> String {
+    let counts = film.counts();
+    let window = film.window();
+    let (pass, [x, y]) = counts
+        .first_non_finite
+        .or(counts.first_negative)
+        .map_or((film.ranges()[0].start, [window.x0, window.y0]), |bad| (bad.pass, bad.pixel));
+    let options = args.method.words().iter().map(|word| format!(" {word}")).collect::<String>();
+    format!("marmor render {}{options} --pixel {x},{y} --pass {pass} --seed {seed}", args.scene.display())
 }
 
 /// NAME.exr and NAME.png in the current folder; NAME is the scene file's, or its folder's for a plain `scene.toml`.
-fn default_outputs(scene: &Path) -> Vec<PathBuf> {
+fn default_outputs(args: &Args) -> Vec<PathBuf> {
+    let scene = &args.scene;
     let stem = |p: &Path| p.file_stem().map(|s| s.to_string_lossy().into_owned());
     let mut name = stem(scene).unwrap_or_else(|| "render".into());
     if name == "scene"
@@ -267,25 +362,14 @@ fn default_outputs(scene: &Path) -> Vec<PathBuf> {
     {
         name = folder;
     }
+    if let Some(range) = &args.keep.samples_range {
+        return vec![PathBuf::from(format!("{name}.{}-{}.film", range.start, range.end))];
+    }
     ["exr", "png"].map(|ending| PathBuf::from(format!("{name}.{ending}"))).to_vec()
 }
 
-/// SIGINT and SIGTERM set the flag; a second one ends the program at once.
-fn cancel_on_signals() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // In this order: the first signal finds the flag unset and only sets it.
-        let both = signal_hook::flag::register_conditional_shutdown(signal, 130, Arc::clone(&flag))
-            .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)));
-        if let Err(error) = both {
-            eprintln!("warning: cannot listen for signal {signal}, an interrupt will lose the picture: {error}");
-        }
-    }
-    flag
-}
-
 /// `30s`, `5m`, `2h`, `500ms`, or a plain number of seconds.
-fn duration(text: &str) -> std::result::Result<Duration, String> {
+pub fn duration(text: &str) -> std::result::Result<Duration, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
     let (number, factor) = units
         .into_iter()
@@ -297,6 +381,14 @@ fn duration(text: &str) -> std::result::Result<Duration, String> {
     }
 }
 
+/// A number above 0.
+fn positive(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(n) if n > 0.0 && n.is_finite() => Ok(n),
+        _ => Err("expected a number above 0 such as 1e-3".into()),
+    }
+}
+
 /// `x0,y0,x1,y1`.
 fn window(text: &str) -> std::result::Result<Window, String> {
     let numbers: Vec<u32> = text.split(',').map_while(|n| n.trim().parse().ok()).collect();
@@ -304,4 +396,10 @@ fn window(text: &str) -> std::result::Result<Window, String> {
         [x0, y0, x1, y1] if x0 < x1 && y0 < y1 => Ok(Window { x0, y0, x1, y1 }),
         _ => Err("expected x0,y0,x1,y1 with x0 < x1 and y0 < y1".into()),
     }
+}
+
+/// `x,y`.
+fn pixel(text: &str) -> std::result::Result<[u32; 2], String> {
+    let numbers: Option<Vec<u32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
+    numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| "expected x,y, two whole numbers".into())
 }

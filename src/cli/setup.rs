@@ -7,8 +7,7 @@ use marmor::integrator::{
 use marmor::query::Backend;
 use marmor::sampling::Points;
 use marmor::scene::{
-    DEFAULT_CUT_ERROR, DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile,
-    Surface,
+    DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, Surface,
 };
 use marmor::{Error, Result};
 use std::path::Path;
@@ -35,6 +34,9 @@ pub struct MethodArgs {
     /// Seed of all random numbers [default: the scene's, else 0]
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Mend meshes before use: no triangles without area or there twice, faces turned outwards
+    #[arg(long)]
+    repair: bool,
     /// Override a value of the scene file, such as camera.fov=30 or material.wax.eta=1.4; may be given more than once
     #[arg(short = 'D', value_name = "KEY=VALUE")]
     define: Vec<String>,
@@ -78,7 +80,7 @@ pub struct Prepared {
     pub method: Method,
     pub backend: Backend,
     pub seed: u64,
-    as_notes: bool,
+    pub as_notes: bool,
     estimator: Estimator,
 }
 
@@ -103,10 +105,9 @@ impl Prepared {
     }
 }
 
-/// Reads and checks a scene, and builds the tables of its method.
-pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
-    let file = SceneFile::read(path)?.with(&args.overrides())?;
-    let mut scene = Scene::load(&file)?;
+/// Reads the meshes of a scene and checks it, and builds the tables of its method.
+pub fn prepare(file: SceneFile, args: &MethodArgs) -> Result<Prepared> {
+    let mut scene = Scene::load_with(&file, args.repair)?;
     if args.as_notes {
         for material in &mut scene.materials {
             if let Surface::Translucent(t) = &mut material.surface {
@@ -123,6 +124,35 @@ pub fn prepare(path: &Path, args: &MethodArgs) -> Result<Prepared> {
 }
 
 impl MethodArgs {
+    /// The scene file with the options in it.
+    pub fn read(&self, path: &Path) -> Result<SceneFile> {
+        SceneFile::read(path)?.with(&self.overrides())
+    }
+
+    /// The options as they are typed, for a line that runs the same again.
+    pub fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        let mut put = |option: &str, value: Option<String>| {
+            if let Some(value) = value {
+                words.extend([option.to_string(), value]);
+            }
+        };
+        put("--method", self.method.map(|m| m.name().into()));
+        put("--model", self.model.map(|m| m.name().into()));
+        put("--estimator", self.estimator.map(|e| e.name().into()));
+        put("--backend", self.backend.map(|b| b.name().into()));
+        for define in &self.define {
+            put("-D", Some(format!("'{define}'")));
+        }
+        if self.repair {
+            words.push("--repair".into());
+        }
+        if self.as_notes {
+            words.push("--as-notes".into());
+        }
+        words
+    }
+
     /// The options as keys of the scene file, so that messages, warnings and file headers know them; `-D` comes last.
     fn overrides(&self) -> Vec<String> {
         let mut keys = Vec::new();
@@ -158,10 +188,12 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
             let options = SubsurfaceOptions {
                 cache_samples: options.cache_samples.unwrap_or(estimator.default_samples()),
                 estimator,
-                cut_error: options.cut_error.map_or(DEFAULT_CUT_ERROR, |e| e as f32),
+                cut_error: options.cut_error.map(|e| e as f32),
                 entry,
                 points,
+                spread: if as_notes { Spread::Area } else { options.spread.unwrap_or(Spread::Seen) },
                 specular: options.specular.unwrap_or(true),
+                single: options.single.unwrap_or(true),
                 light_samples,
                 seed,
             };

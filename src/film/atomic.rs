@@ -6,6 +6,7 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Duration;
 
 /// Writes `path` by way of a temporary file in the same folder: written, flushed to the disk, renamed. If `write`
 /// or any step fails, the old file is as it was and the temporary is removed. A link is followed.
@@ -27,7 +28,28 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
 /// Whether [`write_atomically`] could write `path` now; leaves nothing behind. Same errors.
 pub(super) fn check(path: &Path) -> Result<()> {
     let target = resolve(path)?;
+    sweep(&target);
     Temporary::beside(&target, path).map(drop)
+}
+
+/// Removes temporaries of `target` that killed processes have left: nobody here has their number, and they are old
+/// enough not to belong to another machine's.
+fn sweep(target: &Path) {
+    const OLD: Duration = Duration::from_secs(3600);
+    let Some(name) = target.file_name().and_then(|n| n.to_str()) else { return };
+    for entry in fs::read_dir(folder(target)).into_iter().flatten().flatten() {
+        let found = entry.file_name();
+        let numbers = found.to_str().and_then(|f| {
+            f.strip_prefix('.')?.strip_prefix(name)?.strip_prefix('.')?.strip_suffix(".tmp")?.split_once('-')
+        });
+        let Some((process, count)) = numbers else { continue };
+        let ours = process.parse::<u32>().is_ok() && count.parse::<u32>().is_ok();
+        let alive = !Path::new("/proc/self").exists() || Path::new("/proc").join(process).exists();
+        let age = entry.metadata().and_then(|m| m.modified()).ok().and_then(|m| m.elapsed().ok());
+        if ours && !alive && age.is_some_and(|age| age > OLD) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
 }
 
 fn fill(file: File, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {

@@ -1,14 +1,17 @@
 //! Reading OpenEXR of any layout: scan lines or tiles, half or float, one part or several, with layers or without.
 
-use super::{Attribute, Image, Window, memory};
+use super::{Attribute, Image, Window};
 use crate::math::Rgb;
-use crate::{Error, ErrorKind, Result};
+use crate::{Error, ErrorKind, Result, memory};
 use exr::prelude as exr;
 use exr::{ReadChannels, ReadLayers};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
+
+/// Bytes of samples that one byte of file may stand for.
+const MOST_COMPRESSION: u128 = 2048;
 
 impl Image {
     /// Reads the channels `R`, `G`, `B` of an EXR file; alpha and all other channels are ignored. Pixels of the
@@ -31,6 +34,11 @@ impl Image {
             return Err(Error::file(path, "read", "it holds deep data, which are not supported"));
         }
         let bytes = meta.headers.iter().map(|h| h.layer_size.0 as u128 * h.layer_size.1 as u128 * pixel_bytes(h)).sum();
+        // No compression of EXR is better than this: a short file cannot ask for much memory.
+        let length = std::fs::metadata(path).map_or(0, |m| m.len());
+        if bytes > u128::from(length) * MOST_COMPRESSION {
+            return Err(Error::file(path, "read", "the file is cut short or damaged: it is too small for its picture"));
+        }
         let what = format!("{}: reading it", path.display());
         memory::require(bytes, memory::available(), &what, "use a smaller picture")?;
         let (names, part) = find(&meta, layer).ok_or_else(|| no_channels(path, layer, &meta))?;

@@ -128,8 +128,8 @@ pub fn compare(image: &Image, reference: &Image, interior: Option<&[bool]>) -> R
 /// passes that are independent, mean((even - odd)^2) times n_e n_o / (n_e + n_o)^2 (a quarter for equal halves) has
 /// the expectation of mean((image - limit)^2). None before two passes, or where `interior` marks no pixel.
 ///
-/// Passes of one continued low-discrepancy sequence repel each other, so their halves differ by more than
-/// independent ones: the estimate is then on the large side. It knows nothing of a model's own error.
+/// Renders keep the halves independent (`sampling/turn.rs`). [`super::SelfError`] follows a growing film and gives
+/// narrower intervals than the spread between blocks. Neither knows of a model's own error.
 pub fn from_halves(film: &Film, interior: Option<&[bool]>) -> Option<Errors> {
     let [even, odd] = film.half_images()?;
     let image = film.image();
@@ -213,7 +213,9 @@ fn mean_ratio(window: Window, x: &[Rgb], r: &[Rgb], c: usize, used: &[bool]) -> 
 }
 
 impl Estimate {
-    fn sqrt(self) -> Self {
+    /// The root of value and interval.
+    #[must_use]
+    pub fn sqrt(self) -> Self {
         Self { value: self.value.sqrt(), interval: self.interval.map(|ends| ends.map(f64::sqrt)) }
     }
 }
@@ -250,7 +252,7 @@ impl Ratio {
 
 /// The 0.975 quantile of Student's t: 95 % of it lies within plus or minus this. Exact to 4 digits for one and two
 /// degrees of freedom, else by the expansion about the normal quantile [AS64, 26.7.5] (0.2 % at three, better above).
-fn student_975(freedom: usize) -> f64 {
+pub(super) fn student_975(freedom: usize) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     match freedom {
         0 => f64::INFINITY,

@@ -3,21 +3,27 @@
 //! Read first: `sums.rs` (the film), then `output.rs` (saving). docs/output.md tells users what is in the files.
 
 mod atomic;
+mod checkpoint;
+mod exact;
 mod exr_file;
 mod exr_read;
 mod image;
-mod memory;
 pub mod metrics;
 mod output;
 mod png_file;
+mod self_error;
 mod sums;
+mod variance;
 mod window;
 
 pub use atomic::write_atomically;
+pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::Image;
-pub use output::{Format, PngOptions, SaveReport, check_writable, save};
+pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, save, save_with_layers};
 pub use png_file::PngReport;
+pub use self_error::{SelfError, SelfErrors};
 pub use sums::{BadSample, Counts, Film};
+pub use variance::variance;
 pub use window::Window;

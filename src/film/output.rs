@@ -13,6 +13,8 @@ pub enum Format {
     Exr,
     /// 8 bits per channel, for looking at.
     Png,
+    /// The sums themselves, to go on with or to merge: see [`super::Checkpoint`].
+    Film,
 }
 
 impl Format {
@@ -25,8 +27,10 @@ impl Format {
         match ending.as_deref() {
             Some("exr") => Ok(Self::Exr),
             Some("png") => Ok(Self::Png),
+            Some("film") => Ok(Self::Film),
             _ => Err(Error::usage(format!(
-                "{}: the name of a picture ends in .exr (linear, for measuring) or .png (8 bits, for looking at)",
+                "{}: the name of a picture ends in .exr (linear, for measuring), .png (8 bits, for looking at) or .film (sums, to go \
+                 on with or to merge)",
                 path.display()
             ))),
         }
@@ -53,9 +57,38 @@ pub struct SaveReport {
 /// # Errors
 /// Usage for another ending or an exposure that is not a number; File if it cannot be written.
 pub fn save(image: &Image, path: &Path, metadata: &Metadata, png: PngOptions) -> Result<SaveReport> {
+    save_with_layers(image, &[], path, metadata, png)
+}
+
+/// A picture beside the main one in an EXR file: channels `NAME.R`, `NAME.G`, `NAME.B`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// Before the dot.
+    pub name: String,
+    /// Of the same window as the main picture.
+    pub image: Image,
+}
+
+/// The same with further layers in an EXR; a PNG has no place for them.
+///
+/// # Errors
+/// As [`save`]; Usage if a layer has another window.
+pub fn save_with_layers(
+    image: &Image,
+    layers: &[Layer],
+    path: &Path,
+    metadata: &Metadata,
+    png: PngOptions,
+) -> Result<SaveReport> {
     match Format::of(path)? {
         Format::Exr => {
-            let channels = exr_file::channels(image, None);
+            if let Some(layer) = layers.iter().find(|layer| layer.image.window != image.window) {
+                return Err(Error::usage(format!("the layer `{}` has another window than the picture", layer.name)));
+            }
+            let mut channels = exr_file::channels(image, None);
+            for layer in layers {
+                channels.extend(exr_file::channels(&layer.image, Some(&layer.name)));
+            }
             let bytes = exr_file::encode(image.resolution, image.window, channels, metadata)
                 .map_err(|e| e.within(path.display()))?;
             atomic::write_atomically(path, |file| file.write_all(&bytes))?;
@@ -72,6 +105,7 @@ pub fn save(image: &Image, path: &Path, metadata: &Metadata, png: PngOptions) ->
             })?;
             Ok(SaveReport { png: Some(report) })
         }
+        Format::Film => Err(Error::usage(format!("{}: a film file holds sums, not a picture", path.display()))),
     }
 }
 

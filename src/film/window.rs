@@ -1,9 +1,9 @@
 //! A rectangle of pixels.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Pixels with x0 <= x < x1 and y0 <= y < y1; (0, 0) is the upper left pixel of the whole picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Window {
     /// First column.
     pub x0: u32,

@@ -1,6 +1,6 @@
 //! A mesh of triangles, and the point of a surface that a ray or a sampler found.
 
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec3, hash_combine};
 
 /// Triangles over shared vertices, in world space relative to the scene's centre.
 #[derive(Clone, Debug, Default)]
@@ -88,6 +88,25 @@ impl Mesh {
         let [a, b, c] = normals.triangles[triangle as usize].map(|i| normals.vectors[i as usize]);
         let n = (a * (1.0 - u - v) + b * u + c * v).normalize_or(n_geometric);
         if n.dot(n_geometric) < 0.0 { -n } else { n }
+    }
+
+    /// Memory of vertices, triangles and normals.
+    pub fn bytes(&self) -> usize {
+        let normals = self.normals.as_ref().map_or(0, |n| size_of_val(&*n.vectors) + size_of_val(&*n.triangles));
+        size_of_val(&*self.positions) + size_of_val(&*self.triangles) + normals
+    }
+
+    /// A hash of every bit of the mesh.
+    pub fn fingerprint(&self) -> u64 {
+        let point = |state: u64, p: &Vec3| p.to_array().iter().fold(state, |s, x| hash_combine(s, x.to_bits().into()));
+        let index = |state: u64, t: &[u32; 3]| t.iter().fold(state, |s, &i| hash_combine(s, i.into()));
+        let mut state = self.positions.iter().fold(self.positions.len() as u64, point);
+        state = self.triangles.iter().fold(state, index);
+        if let Some(normals) = &self.normals {
+            state = normals.vectors.iter().fold(hash_combine(state, 1), point);
+            state = normals.triangles.iter().fold(state, index);
+        }
+        state
     }
 
     /// Smallest and largest corner of the box around all vertices [unit]; `None` without vertices.

@@ -3,6 +3,7 @@
 
 mod area_table;
 mod clearance;
+mod doctor;
 mod mesh;
 mod morton;
 mod obj;
@@ -12,8 +13,9 @@ mod shapes;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
+pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;
-pub use obj::load_obj;
+pub use obj::{LOADING_BYTES, load_obj, write_obj};
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};

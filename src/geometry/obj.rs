@@ -1,13 +1,16 @@
 //! OBJ files through `tobj`: positions in f64, polygons cut into triangles, groups joined.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Write};
 use std::path::Path;
 
 use super::obj_lines::ObjLines;
 use super::{ObjMesh, ObjNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
+
+/// Memory while a mesh is read and looked at [bytes/triangle], at its most.
+pub const LOADING_BYTES: usize = 320;
 
 /// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
 /// left out. A polygon becomes the fan of triangles about its first corner, which is right for convex polygons and
@@ -18,7 +21,7 @@ use crate::math::DVec3;
 /// # Errors
 /// A file error if `path` cannot be read. A scene error that names path and line if a vertex is not finite or not a
 /// number, an index is 0 or of a vertex that does not exist, or a line is longer than 1 MiB; one that names the path
-/// if there are no faces.
+/// if there are no faces. A Memory error, found while reading, if the mesh is more than what is available.
 pub fn load_obj(path: &Path) -> Result<ObjMesh> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
     if !metadata.is_file() {
@@ -29,12 +32,39 @@ pub fn load_obj(path: &Path) -> Result<ObjMesh> {
     parse(&mut ObjLines::new(BufReader::with_capacity(1 << 16, file)), path)
 }
 
+/// Writes a mesh as OBJ, every digit of it.
+///
+/// # Errors
+/// What the system says.
+pub fn write_obj(mesh: &ObjMesh, out: &mut dyn Write) -> std::io::Result<()> {
+    for p in &mesh.positions {
+        writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
+    }
+    for n in mesh.normals.iter().flat_map(|n| &n.vectors) {
+        writeln!(out, "vn {:?} {:?} {:?}", n.x, n.y, n.z)?;
+    }
+    for (i, t) in mesh.triangles.iter().enumerate() {
+        let [a, b, c] = t.map(|v| v + 1);
+        match mesh.normals.as_ref().and_then(|n| n.triangles[i]) {
+            Some(n) => {
+                let [na, nb, nc] = n.map(|v| v + 1);
+                writeln!(out, "f {a}//{na} {b}//{nb} {c}//{nc}")?;
+            }
+            None => writeln!(out, "f {a} {b} {c}")?,
+        }
+    }
+    Ok(())
+}
+
 fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<ObjMesh> {
     let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
     let loaded = tobj::load_obj_buf(lines, &options, |_| Err(tobj::LoadError::OpenFileFailed));
     // What the reader of lines found first; tobj's own complaints carry no line.
     if let Some(cause) = lines.failed_read() {
         return Err(Error::file(path, "read", cause));
+    }
+    if let Some(error) = lines.out_of_memory() {
+        return Err(error.within(path.display()));
     }
     let at = |line: usize, what: &str| Error::scene(format!("{}:{line}: {what}", path.display()));
     if let Some((line, what)) = lines.complaint() {

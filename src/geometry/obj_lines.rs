@@ -1,6 +1,7 @@
 //! The lines of an OBJ file on their way to `tobj`: counted, so that a complaint can name one, and reduced to what we
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
+use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
 
 /// Longer than any real line; keeps a binary file from being read as one.
@@ -25,6 +26,9 @@ pub(super) struct ObjLines<R> {
     ignored: usize,
     complaint: Option<(usize, String)>,
     failed: Option<io::Error>,
+    /// Entries at which memory is looked at next.
+    look_at: usize,
+    out_of_memory: Option<Error>,
 }
 
 /// At most 40 characters of a line, for messages.
@@ -51,6 +55,8 @@ impl<R: BufRead> ObjLines<R> {
             ignored: 0,
             complaint: None,
             failed: None,
+            look_at: 1 << 20,
+            out_of_memory: None,
         }
     }
 
@@ -76,6 +82,24 @@ impl<R: BufRead> ObjLines<R> {
     /// For each triangle of the fans, whether all corners of its face had a normal.
     pub(super) fn has_normals(&self) -> &[bool] {
         &self.has_normals
+    }
+
+    /// That the mesh is more than what is available, if it is.
+    pub(super) fn out_of_memory(&mut self) -> Option<Error> {
+        self.out_of_memory.take()
+    }
+
+    /// Whether there is memory to read on: as much again as what has been read needs.
+    fn fits(&mut self, count: usize) -> bool {
+        if count < self.look_at {
+            return true;
+        }
+        self.look_at = 2 * count;
+        let needed = count as u128 * super::LOADING_BYTES as u128;
+        let what = format!("a mesh of {count} or more vertices or triangles");
+        let checked = memory::require(needed, memory::available(), &what, "use a coarser mesh");
+        self.out_of_memory = checked.err();
+        self.out_of_memory.is_none()
     }
 
     /// Why the source could not be read, if it could not.
@@ -143,6 +167,10 @@ impl<R: BufRead> ObjLines<R> {
                         || if count < MAX_COUNT { Ok(()) } else { Err("2^31 entries; split the mesh".to_string()) };
                     if let Err(what) = checked.and_then(|()| fits()) {
                         self.complaint = Some((self.line, what));
+                        self.out.clear();
+                        return Ok(());
+                    }
+                    if !self.fits(count) {
                         self.out.clear();
                         return Ok(());
                     }

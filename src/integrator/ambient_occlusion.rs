@@ -1,10 +1,13 @@
 //! The share of the cosine-weighted hemisphere that is open.
 
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::math::Rgb;
+use crate::math::{Frame, Rgb};
 use crate::query::Ray;
-use crate::sampling::cosine_hemisphere;
+use crate::sampling::Pairs;
 use crate::scene::Scene;
+
+/// Occlusion rays that go to the backend together, unless one camera ray has more: some MB a thread.
+const MOST_PROBES: usize = 1 << 16;
 
 /// (1/π) ∫ V(ω) cosθ dω over the hemisphere on the camera's side; grey, in [0, 1]; 1 where nothing is hit.
 pub struct AmbientOcclusion {
@@ -23,25 +26,34 @@ impl Integrator for AmbientOcclusion {
         let hits = view.camera_hits(rays, tally);
 
         let per_hit = self.rays as usize;
-        let mut probes = Vec::with_capacity(rays.len() * per_hit);
-        for (ray, hit) in rays.iter().zip(&hits) {
-            let Some(hit) = hit else { continue };
-            let at = view.point(hit, ray.ray.direction);
-            for part in 0..self.rays {
-                let w = cosine_hemisphere(at.n, ray.stream.split(part, self.rays).next_2d());
-                probes.push(Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) });
+        let together = (MOST_PROBES / per_hit).max(1);
+        for ((rays, hits), out) in rays.chunks(together).zip(hits.chunks(together)).zip(out.chunks_mut(together)) {
+            let mut pairs = Pairs::with_capacity(rays.len() * per_hit);
+            let mut points = Vec::with_capacity(rays.len());
+            for (ray, hit) in rays.iter().zip(hits) {
+                let Some(hit) = hit else { continue };
+                points.push(view.point(hit, ray.ray.direction));
+                pairs.push_splits(&ray.stream, self.rays);
             }
-        }
-        let mut occluded = vec![false; probes.len()];
-        view.rays.occluded_batch(&probes, &mut occluded);
-        tally.rays.shadow += probes.len() as u64;
+            let mut probes = Vec::with_capacity(points.len() * per_hit);
+            for (at, local) in points.iter().zip(pairs.cosine_hemisphere().chunks_exact(per_hit)) {
+                let frame = Frame::about(at.n);
+                probes.extend(local.iter().map(|&w| {
+                    let w = frame.to_world(w);
+                    Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) }
+                }));
+            }
+            let mut occluded = vec![false; probes.len()];
+            view.rays.occluded_batch(&probes, &mut occluded);
+            tally.rays.shadow += probes.len() as u64;
 
-        let mut groups = occluded.chunks_exact(per_hit);
-        for (hit, out) in hits.iter().zip(out) {
-            *out = match hit.and_then(|_| groups.next()) {
-                Some(group) => Rgb::splat(group.iter().filter(|&&hidden| !hidden).count() as f32 / per_hit as f32),
-                None => Rgb::WHITE,
-            };
+            let mut groups = occluded.chunks_exact(per_hit);
+            for (hit, out) in hits.iter().zip(out) {
+                *out = match hit.and_then(|_| groups.next()) {
+                    Some(group) => Rgb::splat(group.iter().filter(|&&hidden| !hidden).count() as f32 / per_hit as f32),
+                    None => Rgb::WHITE,
+                };
+            }
         }
     }
 

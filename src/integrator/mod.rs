@@ -4,6 +4,7 @@
 mod ambient_occlusion;
 mod direct;
 mod shade;
+mod single;
 mod subsurface;
 mod volume_path;
 
@@ -54,7 +55,8 @@ pub struct CameraRay {
 }
 
 /// What the work cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct Tally {
     /// Rays by kind.
     pub rays: RayTally,
@@ -65,7 +67,8 @@ pub struct Tally {
 }
 
 /// What paths inside media cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct WalkTally {
     /// Stays of a path in a body.
     pub walks: u64,
@@ -137,8 +140,14 @@ pub trait Integrator: Sync {
     /// Prepares pass number `pass`.
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass;
 
-    /// Radiance along each ray. Pure: the same arguments give the same bytes on any thread.
+    /// Radiance along each ray of a tile. Pure: the same arguments give the same bytes on any thread.
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally);
+
+    /// True if the rays of one call share work, so that a pixel's bytes depend on which others come with it: the
+    /// renderer then always hands over whole tiles.
+    fn shares_tiles(&self) -> bool {
+        false
+    }
 
     /// What was built for this scene, and what was left out.
     fn parts(&self, scene: &Scene) -> Vec<Part>;

@@ -2,17 +2,25 @@
 
 use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
+use super::single::Single;
 use super::{CameraRay, Integrator, Part, Tally, View};
-use crate::bssrdf::{Exit, Model};
-use crate::cache::{Envelope, Filler, Gatherer, PLAIN_SUM, Scratch};
+use crate::bssrdf::{Exit, Model, Partition};
+use crate::cache::{
+    CachedSample, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
+};
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
-use crate::math::{Rgb, Vec3};
+use crate::math::{Rgb, Vec3, hash_combine};
+use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
-use crate::sampling::{CacheStream, PixelStream, Points};
-use crate::scene::{EntrySampling, Estimator, Scene, Surface};
+use crate::sampling::{CacheStream, PixelStream, Points, Turn};
+use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface};
+use std::sync::OnceLock;
+
+/// A cached sample, its columns twice while the tree is built, and its share of the tree.
+const BYTES_PER_SAMPLE: u128 = 256;
 
 /// Options of [`Subsurface`].
 #[derive(Clone, Copy, Debug)]
@@ -21,14 +29,18 @@ pub struct SubsurfaceOptions {
     pub cache_samples: u32,
     /// How the sum over the cache is estimated.
     pub estimator: Estimator,
-    /// The largest share of the sum that one node of a `cut` may be wrong by.
-    pub cut_error: f32,
+    /// The largest share of the sum that one node of a `cut` may be wrong by; by the noise of the cache if absent.
+    pub cut_error: Option<f32>,
     /// How directions of entering light are picked.
     pub entry: EntrySampling,
-    /// How points on the surface are spread.
+    /// What numbers pick the points on the surface.
     pub points: Points,
+    /// How the points are spread over the surface.
+    pub spread: Spread,
     /// Whether smooth surfaces mirror lights and environment.
     pub specular: bool,
+    /// Whether light scattered once is added to models that leave it out.
+    pub single: bool,
     /// Samples of each kind of light per diffuse point.
     pub light_samples: u32,
     /// Seed of the render.
@@ -43,6 +55,30 @@ pub struct Subsurface {
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
     bodies: Vec<Option<Body>>,
+    /// Light scattered once, where a model leaves it out.
+    single: Option<Single>,
+    /// What is known of each body with the first pass.
+    plans: OnceLock<Vec<Plan>>,
+}
+
+/// Fewer cached samples than this in the area whose light matters to an exit, and the near field is sampled for each exit.
+const NEAR_SAMPLES: f64 = 8.0;
+/// Radius of the near field in distances between cached samples.
+const NEAR_RADIUS: f32 = 3.0;
+/// Sums below this share of what is typical for the object are held to the accuracy of one of this size.
+const DARK: f32 = 0.1;
+/// A cut whose nodes may be wrong by a share e adds a relative variance of about 0.001 e: with this factor a third of the
+/// cache's.
+const CUT_SHARE: f64 = 300.0;
+/// The finest cut.
+const FINEST: f64 = 0.01;
+/// The coarsest cut.
+const COARSEST: f64 = 0.2;
+
+/// How a body's light is gathered.
+struct Plan {
+    survey: Survey,
+    near: Option<NearField>,
 }
 
 /// A translucent object.
@@ -51,7 +87,9 @@ struct Body {
     model: Model,
     envelope: Envelope,
     table: AreaTable,
-    stream: CacheStream,
+    /// Of even passes and of odd ones.
+    streams: [CacheStream; Turn::STREAMS],
+    cosine_share: f32,
 }
 
 impl Subsurface {
@@ -60,50 +98,158 @@ impl Subsurface {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Result<Self> {
+        let translucent =
+            |o: &crate::scene::Object| matches!(scene.materials[o.material].surface, Surface::Translucent(_));
+        let samples = scene.objects.iter().filter(|o| translucent(o)).count() as u64 * u64::from(options.cache_samples);
+        let what = format!("the cache of {samples} samples a pass");
+        let needed = u128::from(samples) * BYTES_PER_SAMPLE;
+        memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
+        let lights = Lights::new(scene);
         let body = |(index, object): (usize, &crate::scene::Object)| {
             let Surface::Translucent(t) = &scene.materials[object.material].surface else { return Ok(None) };
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
-            let stream = CacheStream::new(options.points, options.seed, index as u64);
+            let stream = |seed| CacheStream::new(options.points, seed, index as u64);
             let model = t.build()?;
             let envelope = Envelope::new(&model, &t.medium);
-            Ok(Some(Body { medium: t.medium, model, envelope, table, stream }))
+            let streams = Turn::seeds(options.seed).map(stream);
+            let cosine_share = object.mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds));
+            Ok(Some(Body { medium: t.medium, model, envelope, table, streams, cosine_share }))
         };
+        let bodies = scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?;
         Ok(Self {
             options,
-            light: DirectLight { lights: Lights::new(scene), samples: options.light_samples },
+            light: DirectLight { lights, samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
-            bodies: scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?,
+            bodies,
+            single: if options.single { Single::new(scene, options.seed)? } else { None },
+            plans: OnceLock::new(),
         })
     }
 
-    fn shade(
+    /// What fills the cache of object number `object`.
+    fn filler<'a>(
+        &'a self,
+        view: View<'a>,
+        object: usize,
+        body: &'a Body,
+        stream: &'a CacheStream,
+        density: &'a Density,
+    ) -> Filler<'a> {
+        Filler {
+            scene: view.scene,
+            rays: view.rays,
+            lights: &self.light.lights,
+            object: object as u32,
+            table: &body.table,
+            model: &body.model,
+            eta: body.medium.eta,
+            sampling: self.options.entry,
+            cosine_share: body.cosine_share,
+            stream,
+            density,
+        }
+    }
+
+    /// What is known of each body before its first pass. A function of scene and seed: the same for any pass that asks first.
+    fn plans(&self, view: View<'_>) -> Vec<Plan> {
+        // With directions by the cosine most trials would miss the lights.
+        let blind = self.options.entry == EntrySampling::Cosine || self.options.estimator == Estimator::Notes;
+        let mut points = if blind { Vec::new() } else { seen(view.scene, view.rays) };
+        points.resize(self.bodies.len(), Vec::new());
+        let even = Density::even();
+        let plan = |(object, (body, seen)): (usize, (&Option<Body>, Vec<Seen>))| {
+            let Some(body) = body.as_ref().filter(|_| !seen.is_empty()) else {
+                return Plan { survey: Survey::none(), near: None };
+            };
+            let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
+            let filler = self.filler(view, object, body, &stream, &even);
+            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread);
+            Plan { survey, near: self.near(body) }
+        };
+        self.bodies.iter().zip(points).enumerate().map(plan).collect()
+    }
+
+    /// The near field of media whose light does not come as far as the next sample of the cache.
+    fn near(&self, body: &Body) -> Option<NearField> {
+        let split = matches!(self.options.estimator, Estimator::All | Estimator::Cut | Estimator::Cluster);
+        let apart2 = body.table.area() / f64::from(self.options.cache_samples);
+        let sparse = body.envelope.effective_area() < NEAR_SAMPLES * apart2;
+        (split && sparse).then(|| NearField::new(&body.envelope, NEAR_RADIUS * apart2.sqrt() as f32))
+    }
+
+    /// How fine the sums of pass number `pass` are.
+    fn tuning(&self, plan: &Plan, pass: u32) -> Tuning {
+        let passes = f64::from(pass) + 1.0;
+        let noise2 = plan.survey.noise2(passes * f64::from(self.options.cache_samples));
+        // Draws of a cut are new in each pass, and average as its number; the cache's stream goes on and averages faster.
+        let error = self.options.cut_error.unwrap_or((CUT_SHARE * passes * noise2).clamp(FINEST, COARSEST) as f32);
+        Tuning {
+            error,
+            floor: DARK * plan.survey.typical,
+            partition: plan.near.as_ref().map_or(Partition::NONE, |near| near.partition),
+        }
+    }
+
+    /// What leaves through the surface at each translucent hit; exits of one object are gathered together.
+    fn inside(
         &self,
         view: View<'_>,
         pass: &[Option<Gatherer>],
-        ray: &CameraRay,
-        hit: &Hit,
-        scratch: &mut Scratch,
+        rays: &[CameraRay],
+        hits: &[Option<Hit>],
         tally: &mut Tally,
-    ) -> Rgb {
+    ) -> Vec<Rgb> {
+        let mut inside = vec![Rgb::BLACK; rays.len()];
+        let object = |i: usize| hits[i].as_ref().map(|hit| hit.mesh as usize).filter(|&o| self.bodies[o].is_some());
+        let mut translucent: Vec<(usize, usize)> = (0..rays.len()).filter_map(|i| Some((object(i)?, i))).collect();
+        translucent.sort_unstable();
+        let (mut scratch, mut found) = (Scratch::default(), Vec::new());
+        for group in translucent.chunk_by(|a, b| a.0 == b.0) {
+            let (Some(body), Some(gatherer)) = (&self.bodies[group[0].0], &pass[group[0].0]) else { continue };
+            let exit = |&(_, i): &(usize, usize)| {
+                let (w, hit) = (-rays[i].ray.direction, hits[i].as_ref()?);
+                let at = view.point(hit, rays[i].ray.direction);
+                Some(Exit { x: at.x, n: at.normal_seen_from(w), w })
+            };
+            let exits: Vec<Exit> = group.iter().filter_map(exit).collect();
+            let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
+            gatherer.gather((&body.model, &body.envelope), &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
+            let plan = self.plans.get().map(|plans| &plans[group[0].0]);
+            if let Some(Plan { survey, near: Some(near) }) = plan {
+                let filler = self.filler(view, group[0].0, body, &body.streams[0], &survey.density);
+                for ((exit, &key), sum) in exits.iter().zip(&keys).zip(&mut found) {
+                    *sum += near.estimate(
+                        &filler,
+                        exit,
+                        hash_combine(key, 0x6e65_6172),
+                        (&mut tally.rays, &mut tally.gather),
+                    );
+                }
+            }
+            for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
+                inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));
+                if let (Some(single), Some(hit)) = (&self.single, &hits[i]) {
+                    inside[i] += single.radiance(view, &rays[i], hit, tally);
+                }
+            }
+        }
+        inside
+    }
+
+    fn shade(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, inside: Rgb, tally: &mut Tally) -> Rgb {
         let at = view.point(hit, ray.ray.direction);
         let mut stream = ray.stream;
         let object = hit.mesh as usize;
-        let (Some(body), Some(gatherer)) = (&self.bodies[object], &pass[object]) else {
+        let Some(body) = &self.bodies[object] else {
             return emitted(view.scene, hit, ray.ray.direction)
                 + self.light.reflected(view, &at, self.albedo[object], &mut stream, tally);
         };
+        if !self.options.specular {
+            return inside;
+        }
         let w = -ray.ray.direction;
-        let eta = body.medium.eta;
         let n = at.normal_seen_from(w);
-        let mu = n.dot(w);
-        let exit = Exit { x: at.x, n, w };
-        let inside = gatherer.gather(&body.model, &body.envelope, &exit, stream.key(), scratch, &mut tally.gather);
-        let mirrored = if self.options.specular {
-            self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(eta, mu)
-        } else {
-            Rgb::BLACK
-        };
-        inside * transmittance(eta, mu) + mirrored
+        inside + self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(body.medium.eta, n.dot(w))
     }
 
     fn tree_part(&self, name: &str) -> Part {
@@ -142,37 +288,38 @@ impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        let plans = self.plans.get_or_init(|| self.plans(view));
+        let turn = Turn::of(self.options.seed, pass);
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
-            let filler = Filler {
-                scene: view.scene,
-                rays: view.rays,
-                lights: &self.light.lights,
-                object: object as u32,
-                table: &body.table,
-                model: &body.model,
-                eta: body.medium.eta,
-                sampling: self.options.entry,
-                stream: &body.stream,
-            };
+            let density = &plans[object].survey.density;
+            let filler = self.filler(view, object, body, &body.streams[turn.stream], density);
             let count = self.options.cache_samples;
-            let cache = filler.fill(u64::from(pass) * u64::from(count), count, &mut tally.rays);
+            let mut cache = filler.fill(u64::from(turn.number) * u64::from(count), count, &mut tally.rays);
+            let all = cache.lit.len();
+            cache.lit.retain(CachedSample::is_finite);
+            tally.gather.non_finite += (all - cache.lit.len()) as u64;
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
-            Some(Gatherer::new(self.options.estimator, cache, &body.model, self.options.cut_error))
+            let tuning = self.tuning(&plans[object], pass);
+            Some(Gatherer::new(self.options.estimator, cache, &body.model, tuning))
         };
         self.bodies.iter().enumerate().map(fill).collect()
     }
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = view.camera_hits(rays, tally);
-        let mut scratch = Scratch::default();
-        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+        let inside = self.inside(view, pass, rays, &hits, tally);
+        for (((ray, hit), inside), out) in rays.iter().zip(&hits).zip(inside).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(),
-                Some(hit) => self.shade(view, pass, ray, hit, &mut scratch, tally),
+                Some(hit) => self.shade(view, ray, hit, inside, tally),
             };
         }
+    }
+
+    fn shares_tiles(&self) -> bool {
+        matches!(self.options.estimator, Estimator::Cut | Estimator::Cluster)
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {
@@ -206,6 +353,13 @@ impl Integrator for Subsurface {
                 Part::built(format!("colour of `{name}`"), "S_d is evaluated in three channels")
             });
         }
+        parts.push(match (&self.single, self.options.single) {
+            (Some(_), _) => {
+                Part::built("single scattering", "exact, for the models that begin with light scattered twice")
+            }
+            (None, true) => Part::left_out("single scattering", "the models have it"),
+            (None, false) => Part::left_out("single scattering", "switched off"),
+        });
         parts.push(if self.options.specular {
             Part::built("specular reflection", "nearest-hit rays")
         } else {

@@ -3,7 +3,7 @@
 use super::Arrival;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::math::{Rgb, Vec3};
-use crate::query::Ray;
+use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::{Scene, Surface};
 use std::f32::consts::PI;
@@ -23,6 +23,7 @@ struct Emitter {
     two_sided: bool,
     /// Chance of a point per area [1/unit²]: the emitter's own chance over its area.
     pdf_area: f32,
+    bounds: (Vec3, Vec3),
 }
 
 impl Lights {
@@ -36,10 +37,10 @@ impl Lights {
             if radiance.is_black() {
                 continue;
             }
-            let Some(table) = AreaTable::new(&o.mesh) else { continue };
+            let (Some(table), Some(bounds)) = (AreaTable::new(&o.mesh), o.mesh.bounds()) else { continue };
             power += table.area() * f64::from(radiance.mean()) * if two_sided { 2.0 } else { 1.0 };
             cumulative.push(power);
-            emitters.push(Emitter { object: object as u32, table, radiance, two_sided, pdf_area: 0.0 });
+            emitters.push(Emitter { object: object as u32, table, radiance, two_sided, pdf_area: 0.0, bounds });
         }
         let mut below = 0.0;
         for (emitter, sum) in emitters.iter_mut().zip(&mut cumulative) {
@@ -111,7 +112,7 @@ impl Lights {
         // Divided one length at a time: distance² leaves the range of f32 long before the quotient does.
         let solid_angle = cos_light / distance / distance / emitter.pdf_area;
         let shadow = Ray::between(at.leave(w), light.leave(-w));
-        Some(Arrival { w, irradiance: emitter.radiance * (cos * solid_angle), shadow })
+        Some(Arrival { w, irradiance: emitter.radiance * (cos * solid_angle), pdf_angle: 1.0 / solid_angle, shadow })
     }
 
     /// Light of the environment from a cosine-weighted direction about the surface's normal.
@@ -120,8 +121,32 @@ impl Lights {
         (at.n_geometric.dot(w) > 0.0).then(|| Arrival {
             w,
             irradiance: self.environment * PI,
+            pdf_angle: at.n.dot(w) / PI,
             shadow: Ray::new(at.leave(w), w),
         })
+    }
+
+    /// Chance per solid angle [1/sr] that [`Self::sample_emitter`] looks from `x` along the unit vector `w` to `hit`.
+    pub fn pdf_angle(&self, scene: &Scene, hit: &Hit, w: Vec3) -> f32 {
+        let Some(emitter) = self.emitters.iter().find(|e| e.object == hit.mesh) else { return 0.0 };
+        let cos = scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle).dot(w).abs();
+        hit.t * emitter.pdf_area * hit.t / cos
+    }
+
+    /// Share of directions that are better picked by the cosine for a body within `bounds`: half with an environment, none
+    /// without, unless an emitter is nearer than it is wide: from there its points have densities that differ without
+    /// bound.
+    pub fn cosine_share(&self, (lower, upper): (Vec3, Vec3)) -> f32 {
+        if self.has_environment() {
+            return if self.has_emitters() { 0.5 } else { 1.0 };
+        }
+        let seen = |e: &Emitter| {
+            let gap = (e.bounds.0 - upper).max(lower - e.bounds.1).max(Vec3::ZERO).length();
+            let area = e.table.area() as f32;
+            area / (area + PI * gap * gap)
+        };
+        let largest = self.emitters.iter().map(seen).fold(0.0, f32::max);
+        if largest > 0.3 { 0.5 * largest } else { 0.0 }
     }
 
     /// A cosine-weighted direction about the surface's normal and the ray that looks there.

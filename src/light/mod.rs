@@ -16,6 +16,8 @@ pub struct Arrival {
     /// L_i cosθ_i / pdf: this sample's estimate of irradiance if nothing stands in the way
     /// [radiance unit x sr].
     pub irradiance: Rgb,
+    /// Chance of `w` per solid angle [1/sr].
+    pub pdf_angle: f32,
     /// Light arrives if nothing is hit on this ray.
     pub shadow: Ray,
 }

@@ -4,6 +4,8 @@
 mod exp;
 mod frame;
 mod hash;
+#[allow(unsafe_code)] // calls instructions that the machine was asked for; nothing else
+mod lanes;
 mod quadrature;
 mod rgb;
 #[allow(unsafe_code)] // calls code compiled for instruction sets that it has just looked for; nothing else
@@ -13,6 +15,7 @@ pub use exp::{exp2, exp2_m1, times_exp2};
 pub use frame::Frame;
 pub use glam::{DVec2, DVec3, Vec2, Vec3, Vec4};
 pub use hash::{hash, hash_combine, unit_f32, unit_f64};
+pub use lanes::{F8, LaneKernel, Lanes, Simd, splat3};
 pub use quadrature::GaussLegendre;
 pub use rgb::Rgb;
 pub use simd::{Kernel, Level, dispatch, dispatch_at};

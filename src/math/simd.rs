@@ -15,7 +15,7 @@ pub trait Kernel {
 }
 
 /// An instruction set that a [`Kernel`] can be compiled for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// What the target guarantees: SSE2 on x86-64, NEON on aarch64.
     Baseline,
@@ -88,7 +88,7 @@ fn with_avx512<K: Kernel>(kernel: K) -> K::Out {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn with_avx2<K: Kernel>(kernel: K) -> K::Out {
+pub(super) fn with_avx2<K: Kernel>(kernel: K) -> K::Out {
     kernel.run()
 }
 

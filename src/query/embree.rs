@@ -18,6 +18,9 @@ mod ffi {
 const _: () = assert!(size_of::<ffi::MarmorRay>() == 32 && size_of::<ffi::MarmorHit>() == 20);
 const _: () = assert!(size_of::<Vec3>() == 12 && align_of::<Vec3>() == align_of::<f32>());
 
+/// Rays that cross the border together.
+const BATCH: usize = 64;
+
 /// A committed Embree scene.
 pub struct Embree {
     scene: Scene,
@@ -47,13 +50,7 @@ impl RayQuery for Embree {
         // SAFETY: the scene is committed, unchanged since, and lives until `drop`; `ray` and `hit` are valid for the
         // call, and the wrapper keeps neither pointer.
         let found = unsafe { ffi::marmor_scene_closest(self.scene.0.as_ptr(), &ray, &mut hit) };
-        (found as u32 == ffi::MARMOR_HIT).then_some(Hit {
-            t: hit.t,
-            mesh: hit.mesh,
-            triangle: hit.triangle,
-            u: hit.u,
-            v: hit.v,
-        })
+        (found as u32 == ffi::MARMOR_HIT).then(|| hit.into())
     }
 
     #[inline]
@@ -62,6 +59,38 @@ impl RayQuery for Embree {
         // SAFETY: as in `closest`.
         let found = unsafe { ffi::marmor_scene_occluded(self.scene.0.as_ptr(), &ray) };
         found as u32 == ffi::MARMOR_HIT
+    }
+
+    fn closest_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
+        let empty = (ffi::MarmorRay::default(), ffi::MarmorHit::default());
+        for (rays, hits) in rays.chunks(BATCH).zip(hits.chunks_mut(BATCH)) {
+            let (mut asked, mut told, mut found) = ([empty.0; BATCH], [empty.1; BATCH], [0_u8; BATCH]);
+            for (asked, ray) in asked.iter_mut().zip(rays) {
+                *asked = ray.into();
+            }
+            let (asked, count) = (asked.as_ptr(), rays.len() as u32);
+            let (to, flags) = (told.as_mut_ptr(), found.as_mut_ptr());
+            // SAFETY: as in `closest`; all three arrays have room for `BATCH` entries, and `count` is no more.
+            unsafe { ffi::marmor_scene_closest_batch(self.scene.0.as_ptr(), asked, count, to, flags) };
+            for (i, hit) in hits.iter_mut().enumerate() {
+                *hit = (u32::from(found[i]) == ffi::MARMOR_HIT).then(|| told[i].into());
+            }
+        }
+    }
+
+    fn occluded_batch(&self, rays: &[Ray], out: &mut [bool]) {
+        for (rays, out) in rays.chunks(BATCH).zip(out.chunks_mut(BATCH)) {
+            let (mut asked, mut found) = ([ffi::MarmorRay::default(); BATCH], [0_u8; BATCH]);
+            for (asked, ray) in asked.iter_mut().zip(rays) {
+                *asked = ray.into();
+            }
+            let (asked, flags, count) = (asked.as_ptr(), found.as_mut_ptr(), rays.len() as u32);
+            // SAFETY: as in `closest_batch`.
+            unsafe { ffi::marmor_scene_occluded_batch(self.scene.0.as_ptr(), asked, count, flags) };
+            for (out, found) in out.iter_mut().zip(found) {
+                *out = u32::from(found) == ffi::MARMOR_HIT;
+            }
+        }
     }
 
     fn description(&self) -> String {
@@ -80,6 +109,13 @@ impl From<&Ray> for ffi::MarmorRay {
     #[inline]
     fn from(ray: &Ray) -> Self {
         Self { origin: ray.origin.to_array(), t_min: ray.t_min, direction: ray.direction.to_array(), t_max: ray.t_max }
+    }
+}
+
+impl From<ffi::MarmorHit> for Hit {
+    #[inline]
+    fn from(hit: ffi::MarmorHit) -> Self {
+        Self { t: hit.t, mesh: hit.mesh, triangle: hit.triangle, u: hit.u, v: hit.v }
     }
 }
 

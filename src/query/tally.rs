@@ -1,7 +1,8 @@
 //! How many rays of which kind were traced.
 
 /// Rays by kind.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
 pub struct RayTally {
     /// From the camera.
     pub camera: u64,

@@ -13,4 +13,4 @@ pub use batch::{Batch, BatchOptions};
 pub use monte_carlo::{Bin, Run, channel_run};
 pub use plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
 pub use profile::{Curve, Profile};
-pub use records::{ErrorFigures, Record, RecordFile};
+pub use records::{ErrorFigures, Record, RecordFile, SelfFigures};

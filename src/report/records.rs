@@ -2,7 +2,7 @@
 
 use crate::cache::GatherTally;
 use crate::error::{Error, Result};
-use crate::film::Counts;
+use crate::film::{Counts, SelfErrors};
 use crate::query::RayTally;
 use serde::Serialize;
 use std::fs::File;
@@ -32,9 +32,12 @@ pub struct Record {
     /// Distance to the reference; absent without one.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorFigures>,
+    /// Distance to what the picture converges to, told by its halves; absent before two passes.
+    #[serde(flatten, skip_serializing_if = "Option::is_none")]
+    pub own: Option<SelfFigures>,
     /// Samples left out because they are not numbers.
     pub non_finite: u64,
-    /// Samples clamped: none, marmor clamps nothing.
+    /// Values of S_d below zero that were taken as 0; samples are never clamped.
     pub clamped: u64,
     /// Samples below zero, kept.
     pub negative: u64,
@@ -49,6 +52,27 @@ pub struct ErrorFigures {
     pub relmse: Option<f64>,
     /// 95 % interval of `relmse`; `null` where the picture is too small to tell.
     pub interval: Option<[f64; 2]>,
+}
+
+/// The same figures without a reference.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct SelfFigures {
+    /// Root of the mean squared distance to the limit.
+    pub self_rmse: f64,
+    /// relMSE; `null` if the picture is black.
+    pub self_relmse: Option<f64>,
+    /// 95 % interval of `self_relmse`; `null` before four passes.
+    pub self_interval: Option<[f64; 2]>,
+}
+
+impl From<&SelfErrors> for SelfFigures {
+    fn from(errors: &SelfErrors) -> Self {
+        Self {
+            self_rmse: errors.rmse.value,
+            self_relmse: errors.relmse.map(|e| e.value),
+            self_interval: errors.relmse.and_then(|e| e.interval),
+        }
+    }
 }
 
 impl Record {
@@ -74,6 +98,28 @@ impl RecordFile {
     /// A file error with the path.
     pub fn create(path: &Path) -> Result<Self> {
         let file = File::create(path).map_err(|e| Error::file(path, "write records", e))?;
+        Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
+    }
+
+    /// Goes on with the file at `path` for a render whose next pass is number `next`: lines of later passes, which are
+    /// lost and come again, are removed, and so is a last line that is cut short. Starts a new file where `next` is 0 or
+    /// there is none.
+    ///
+    /// # Errors
+    /// A file error with the path.
+    pub fn go_on(path: &Path, next: u32) -> Result<Self> {
+        if next == 0 || !path.exists() {
+            return Self::create(path);
+        }
+        let old = std::fs::read(path).map_err(|e| Error::file(path, "read records", e))?;
+        let kept = old.split_inclusive(|&b| b == b'\n').filter(|line| {
+            let record: Option<serde_json::Value> = serde_json::from_slice(line).ok();
+            let pass = record.and_then(|r| r.get("pass")?.as_u64());
+            pass.is_some_and(|pass| pass <= next.into()) && line.ends_with(b"\n")
+        });
+        let kept: Vec<u8> = kept.flatten().copied().collect();
+        crate::film::write_atomically(path, |out| out.write_all(&kept))?;
+        let file = File::options().append(true).open(path).map_err(|e| Error::file(path, "write records", e))?;
         Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
     }
 

@@ -2,9 +2,13 @@
 //! Not for: what a number is used for. Read first: `stream.rs`.
 
 mod cache_stream;
+mod pairs;
 mod stream;
+mod turn;
 mod warp;
 
 pub use cache_stream::{CacheStream, Points};
+pub use pairs::Pairs;
 pub use stream::PixelStream;
+pub use turn::Turn;
 pub use warp::{cosine_hemisphere, disk};

@@ -25,18 +25,25 @@ impl PixelStream {
     /// The next two dimensions, in [0, 1).
     #[inline]
     pub fn next_2d(&mut self) -> [f32; 2] {
-        // A pair never straddles two sets of four.
-        self.dimension = self.dimension.next_multiple_of(2);
-        [self.next_1d(), self.next_1d()]
+        // A pair never straddles two sets of four, and a set costs little more than one of its dimensions.
+        let first = self.dimension.next_multiple_of(2);
+        self.dimension = first + 2;
+        let [a, b, c, d] = sobol_burley::sample_4d(self.index, 0, self.set_seed(first));
+        if first.is_multiple_of(4) { [a, b] } else { [c, d] }
     }
 
     /// The next dimension, in [0, 1).
     #[inline]
     pub fn next_1d(&mut self) -> f32 {
-        let set_seed = hash_combine(self.key, u64::from(self.dimension / 4)) as u32;
-        let value = sobol_burley::sample(self.index, self.dimension % 4, set_seed);
+        let value = sobol_burley::sample(self.index, self.dimension % 4, self.set_seed(self.dimension));
         self.dimension += 1;
         value
+    }
+
+    /// Each set of four dimensions is scrambled on its own.
+    #[inline]
+    fn set_seed(&self, dimension: u32) -> u32 {
+        hash_combine(self.key, u64::from(dimension / 4)) as u32
     }
 
     /// Part `part` of `parts` when one sample needs several of the same kind (occlusion rays, light
@@ -48,6 +55,21 @@ impl PixelStream {
         let key = hash_combine(self.key, u64::from(self.dimension / 4) | 1 << 40);
         let key = hash_combine(key, index / u64::from(SEQUENCE_LENGTH));
         Self { key, index: (index % u64::from(SEQUENCE_LENGTH)) as u32, dimension: 0 }
+    }
+
+    /// Index and scramble of the first dimensions of every part, as [`Self::split`] has them.
+    pub(super) fn split_places(&self, parts: u32) -> impl Iterator<Item = (u32, u32)> {
+        let first = u64::from(self.index) * u64::from(parts);
+        let (mut sequence, mut seed) = (None, 0);
+        let this = *self;
+        (0..parts).map(move |part| {
+            let index = first + u64::from(part);
+            let of = index / u64::from(SEQUENCE_LENGTH);
+            if sequence != Some(of) {
+                (sequence, seed) = (Some(of), this.split(part, parts).set_seed(0));
+            }
+            ((index % u64::from(SEQUENCE_LENGTH)) as u32, seed)
+        })
     }
 
     /// Goes on to dimensions that no earlier [`Self::split`] of this stream has used.
@@ -76,6 +98,16 @@ mod tests {
         assert_eq!(numbers(1, 2, 3), numbers(1, 2, 3));
         for other in [numbers(2, 2, 3), numbers(1, 3, 3), numbers(1, 2, 4), numbers(1, 2, 3 + (1 << 16))] {
             assert_ne!(other, numbers(1, 2, 3));
+        }
+    }
+
+    #[test]
+    fn a_pair_is_the_next_two_numbers() {
+        for start in 0..6 {
+            let mut pair = PixelStream { dimension: start, ..PixelStream::new(5, 6, 7) };
+            let mut single = PixelStream { dimension: start.next_multiple_of(2), ..pair };
+            assert_eq!(pair.next_2d(), [single.next_1d(), single.next_1d()]);
+            assert_eq!(pair.dimension, single.dimension);
         }
     }
 

@@ -105,6 +105,22 @@ impl SceneFile {
         toml::to_string(&self.root.to_toml()).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
     }
 
+    /// [`Self::effective`] without what decides no bit of a sample: how many there are, and how they are shown.
+    pub fn decisive(&self) -> String {
+        let mut all = self.root.to_toml();
+        if let Some(render) = all.get_mut("render").and_then(toml::Value::as_table_mut) {
+            for key in ["spp", "exposure"] {
+                render.remove(key);
+            }
+            if render.is_empty()
+                && let Some(table) = all.as_table_mut()
+            {
+                table.remove("render");
+            }
+        }
+        toml::to_string(&all).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
+    }
+
     fn from_tree(root: Node, path: &Path) -> Result<Self> {
         let top = Fields::open(path, String::new(), &root)?;
         top.only("a scene", SECTIONS)?;
@@ -230,7 +246,9 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         "cut_error",
         "model",
         "entry",
+        "spread",
         "specular",
+        "single",
         "orders",
         "photons",
     ];
@@ -246,7 +264,9 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
             .get("cut_error", "a number from 1e-4 to 1", |n| n.number().filter(|v| (1e-4..=1.0).contains(v)))?,
         model: named_value(&m, "model")?,
         entry: named_value(&m, "entry")?,
+        spread: named_value(&m, "spread")?,
         specular: switch(&m, "specular")?,
+        single: switch(&m, "single")?,
         orders: named_value(&m, "orders")?,
         photons: m.get("photons", "a whole number from 0 to 16777216", |n| {
             n.integer().filter(|i| (0..=1 << 24).contains(i)).map(|i| i as u32)

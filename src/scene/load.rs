@@ -9,8 +9,9 @@ use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
 use super::{Camera, Material, Object, Scene, Surface, warnings};
 use crate::error::{Error, Result};
-use crate::geometry::{Mesh, ObjMesh, load_obj, rectangle, sphere};
+use crate::geometry::{LOADING_BYTES, Mended, Mesh, ObjMesh, examine, load_obj, mended, rectangle, sphere};
 use crate::math::{DVec3, Vec3};
+use crate::memory;
 
 impl Scene {
     /// Reads the meshes of a scene file (each OBJ once) and makes the world from them. What is odd but can be
@@ -19,8 +20,17 @@ impl Scene {
     /// # Errors
     /// A file error if a mesh cannot be read; a scene error if one is malformed or has no place in single precision.
     pub fn load(file: &SceneFile) -> Result<Self> {
+        Self::load_with(file, false)
+    }
+
+    /// As [`Self::load`]; with `repair` meshes are mended first, as [`crate::geometry::mended`] says, and what was done
+    /// is among the warnings.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with(file: &SceneFile, repair: bool) -> Result<Self> {
         let mut said = Vec::new();
-        let placed = meshes(file, &mut said)?;
+        let placed = meshes(file, repair, &mut said)?;
         let centre = centre(&placed);
         let mut objects = Vec::with_capacity(placed.len());
         for (entry, mesh) in file.objects.iter().zip(placed) {
@@ -29,7 +39,8 @@ impl Scene {
                 let what = format!("object {:?}: a vertex ({p}) is too far out for single precision", entry.name);
                 return Err(Error::scene(format!("{}: {what}; use a larger `unit` or a smaller `scale`", entry.at)));
             }
-            objects.push(Object { name: entry.name.clone(), mesh, material: entry.material });
+            let findings = examine(&mesh);
+            objects.push(Object { name: entry.name.clone(), mesh, material: entry.material, findings });
         }
         let mut scene = Self {
             name: file.path.display().to_string(),
@@ -66,14 +77,20 @@ impl Scene {
 }
 
 /// The objects' meshes in the scene's space, in f64.
-fn meshes(file: &SceneFile, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
+fn meshes(file: &SceneFile, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
     let folder = file.path.parent().map(PathBuf::from).unwrap_or_default();
     let mut read: HashMap<PathBuf, Rc<ObjMesh>> = HashMap::new();
     let mut out = Vec::with_capacity(file.objects.len());
     for entry in &file.objects {
         let mesh = match &entry.geometry {
             Geometry::Rectangle { centre, edge_u, edge_v } => rectangle(*centre, *edge_u, *edge_v),
-            Geometry::Sphere { centre, radius, rings, segments } => sphere(*centre, *radius, *rings, *segments),
+            Geometry::Sphere { centre, radius, rings, segments } => {
+                let triangles = 2 * u128::from(rings - 1) * u128::from(*segments);
+                let what = format!("{}: object {:?} of {triangles} triangles", entry.at, entry.name);
+                let needed = triangles * LOADING_BYTES as u128;
+                memory::require(needed, memory::available(), &what, "use fewer rings and segments")?;
+                sphere(*centre, *radius, *rings, *segments)
+            }
             Geometry::Mesh(path) => {
                 let path = folder.join(path);
                 let mesh = match read.get(&path) {
@@ -95,12 +112,12 @@ fn meshes(file: &SceneFile, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
                 mesh.as_ref().clone()
             }
         };
-        out.push(place(entry, mesh, said));
+        out.push(place(entry, mesh, repair, said));
     }
     Ok(out)
 }
 
-fn place(entry: &ObjectEntry, mut mesh: ObjMesh, said: &mut Vec<String>) -> ObjMesh {
+fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<String>) -> ObjMesh {
     if entry.normals != NormalsChoice::Auto {
         mesh.normals = None;
     }
@@ -114,6 +131,16 @@ fn place(entry: &ObjectEntry, mut mesh: ObjMesh, said: &mut Vec<String>) -> ObjM
     mesh = mesh.placed(entry.transform.linear, entry.transform.translate);
     if entry.flip {
         mesh = mesh.flipped();
+    }
+    if repair {
+        let done;
+        (mesh, done) = mended(mesh);
+        if done != Mended::default() {
+            said.push(format!(
+                "{}: object {:?} mended: {} triangles without area and {} repeated ones removed, {} turned",
+                entry.at, entry.name, done.zero_area, done.duplicates, done.turned
+            ));
+        }
     }
     // After the transform: a stretch changes the angles.
     if entry.normals == NormalsChoice::Smooth { mesh.with_smooth_normals() } else { mesh }

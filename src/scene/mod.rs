@@ -4,6 +4,7 @@
 //! `load.rs` (the way from one to the other).
 
 mod camera;
+mod doctor;
 mod file;
 mod load;
 mod materials;
@@ -14,10 +15,11 @@ mod warnings;
 mod world;
 
 pub use camera::Camera;
+pub use doctor::Remark;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
 pub use options::{
-    DEFAULT_CUT_ERROR, DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions,
+    DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread,
 };
 pub use world::{Material, Object, Scene, Surface, Translucent};

@@ -70,10 +70,14 @@ named! {
     Estimator, "estimator",
     /// The plain loop over all samples with rejection control.
     Notes = "notes",
+    /// Rejection control as in `notes`, its decisions taken on a tree.
+    Thinned = "thinned",
     /// The vectorised sum over all samples.
     All = "all",
     /// One random member stands for each far node of a tree.
-    Cut = "cut"
+    Cut = "cut",
+    /// The mean of its members stands for each far node of the same tree: biased, for comparison.
+    Cluster = "cluster"
 }
 
 impl Estimator {
@@ -83,16 +87,14 @@ impl Estimator {
         match self {
             Self::Notes => 1024,
             Self::All => 4096,
-            Self::Cut => 32768,
+            Self::Thinned => 16384,
+            Self::Cut | Self::Cluster => 131_072,
         }
     }
 }
 
 /// [`MethodOptions::photons`] unless the scene says.
 pub const DEFAULT_PHOTONS: u32 = 16384;
-
-/// [`MethodOptions::cut_error`] unless the scene says.
-pub const DEFAULT_CUT_ERROR: f32 = 0.3;
 
 named! {
     /// How the light arriving at a cached sample is found.
@@ -101,6 +103,15 @@ named! {
     Light = "light",
     /// Everything by the cosine: the lecture's way.
     Cosine = "cosine"
+}
+
+named! {
+    /// How the points of the cache are spread over a surface.
+    Spread, "way to spread samples",
+    /// More where light enters that the camera gets to see.
+    Seen = "seen",
+    /// Evenly.
+    Area = "area"
 }
 
 /// `[method]`: what is computed. Everything may be absent; the integrator knows the defaults.
@@ -124,6 +135,10 @@ pub struct MethodOptions {
     pub model: Option<ModelName>,
     /// Subsurface: how light is sampled where it enters; by the scene if absent.
     pub entry: Option<EntrySampling>,
+    /// Subsurface: how entry points are spread.
+    pub spread: Option<Spread>,
+    /// Subsurface: add light scattered once to models that leave it out.
+    pub single: Option<bool>,
     /// Volume path: the scattering orders that are wanted.
     pub orders: Option<Orders>,
     /// Volume path: photons per pass and translucent object, 0 to 2^24.

@@ -26,14 +26,13 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         if scene.objects.iter().all(|o| o.material != i) {
             said.push(format!("{head} is used by no object"));
         } else if let Surface::Translucent(t) = &scene.materials[i].surface {
-            said.extend(
-                outside_diffusion(t).into_iter().chain(no_first_order(t)).map(|what| format!("{head}: {what}")),
-            );
+            let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
+            said.extend(outside_diffusion(t).into_iter().chain(first).map(|what| format!("{head}: {what}")));
         }
     }
 }
 
-/// Models of orders 2 and higher want single scattering beside them, which no method renders yet.
+/// Models of orders 2 and higher want single scattering beside them.
 fn no_first_order(t: &Translucent) -> Option<String> {
     struct FirstOrder;
     impl ModelVisitor for FirstOrder {
@@ -45,9 +44,7 @@ fn no_first_order(t: &Translucent) -> Option<String> {
     let model = t.build().ok()?;
     (!model.visit(FirstOrder)).then(|| {
         let name = model.name().name();
-        format!(
-            "`{name}` leaves out light scattered once, which is not rendered yet: some 10 % of the light is missing"
-        )
+        format!("`{name}` leaves out light scattered once, and `single = false` too: some 10 % of the light is missing")
     })
 }
 
@@ -80,22 +77,12 @@ fn outside_diffusion(t: &Translucent) -> Option<String> {
 fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
     for (entry, object) in file.objects.iter().zip(&scene.objects) {
         let head = format!("{}: object {:?}", entry.at, entry.name);
-        let all = object.mesh.triangles.len();
-        let flat = (0..all as u32).filter(|&t| object.mesh.area(t) <= 0.0).count();
-        match &scene.materials[object.material].surface {
-            Surface::Emissive { .. } if flat == all => {
-                said.push(format!("{head}: all {all} triangles have no area: it sends out no light"));
-            }
-            surface => {
-                if flat > 0 {
-                    said.push(format!("{head}: {flat} of {all} triangles have no area; rays and samples pass them by"));
-                }
-                if let Surface::Translucent(t) = surface
-                    && let Some((lo, hi)) = object.mesh.bounds()
-                {
-                    said.extend(thin(t, (hi - lo).as_dvec3().length()).map(|what| format!("{head}: {what}")));
-                }
-            }
+        let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
+        said.extend(found.map(|what| format!("{head}: {what}")));
+        if let Surface::Translucent(t) = &scene.materials[object.material].surface
+            && let Some((lo, hi)) = object.mesh.bounds()
+        {
+            said.extend(thin(t, (hi - lo).as_dvec3().length()).map(|what| format!("{head}: {what}")));
         }
     }
 }

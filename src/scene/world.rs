@@ -1,9 +1,9 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::Camera;
+use super::{Camera, Remark, doctor};
 use crate::bssrdf::{DirectionalDipole, Model, ModelName, choose};
 use crate::error::Result;
-use crate::geometry::Mesh;
+use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
 
@@ -36,6 +36,8 @@ pub struct Object {
     pub mesh: Mesh,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// What is wrong with the mesh.
+    pub findings: Findings,
 }
 
 /// What a surface does to light.
@@ -84,6 +86,11 @@ pub struct Translucent {
 }
 
 impl Scene {
+    /// What there is to say about the mesh of one of [`Self::objects`]; nothing if it is sound.
+    pub fn remarks(&self, object: &Object) -> Vec<Remark> {
+        doctor::remarks(object, &self.materials[object.material].surface)
+    }
+
     /// The surface of an object.
     #[inline]
     pub fn surface(&self, object: u32) -> &Surface {

@@ -1,5 +1,6 @@
 //! What every ray backend of this build must do, against brute force in f64 and against each other.
 #![allow(clippy::unwrap_used)] // a backend that cannot be built has failed the test
+#![allow(clippy::print_stdout)] // figures for docs/rays.md
 
 mod reference;
 mod scenes;
@@ -7,7 +8,7 @@ mod scenes;
 use marmor::geometry::Mesh;
 use marmor::math::Vec3;
 use marmor::query::{self, Backend, Ray, RayQuery};
-use reference::{examine, is_open, verdict};
+use reference::{examine, is_open, nearest_in_f64, verdict};
 use scenes::{Draws, bumpy_sphere, mesh_of, placed, rays, soup};
 
 fn backends<'a>(meshes: &[&'a Mesh]) -> Vec<(Backend, Box<dyn RayQuery + 'a>)> {
@@ -310,5 +311,152 @@ fn threads_do_not_disturb_each_other() {
                 });
             }
         });
+    }
+}
+
+/// Hits and misses against f64 on many rays: how many differ, and each only where a ray passes within rounding of a
+/// silhouette.
+fn against_f64(count: u32) {
+    let mesh = bumpy_sphere(6);
+    let meshes = [&mesh];
+    let share = 1.0 / f64::from(count);
+    for (backend, query) in backends(&meshes) {
+        let mut draws = Draws::new(11);
+        let (mut hits, mut others, mut one_sided) = (0, 0, 0);
+        let mut batch: Vec<Ray> = Vec::with_capacity(1000);
+        for _ in 0..count / 1000 {
+            batch.clear();
+            batch.extend((0..1000).map(|_| {
+                let (from, to) = (draws.direction() * (0.2 + 2.0 * draws.unit()), draws.point());
+                Ray::new(from, to - from)
+            }));
+            let (mut found, mut occluded) = (vec![None; batch.len()], vec![false; batch.len()]);
+            query.closest_batch(&batch, &mut found);
+            query.occluded_batch(&batch, &mut occluded);
+            for ((ray, hit), occluded) in batch.iter().zip(&found).zip(occluded) {
+                let nearest = nearest_in_f64(&mesh, ray);
+                hits += u32::from(hit.is_some());
+                assert_eq!(hit.is_some(), occluded, "{}: {ray:?}", backend.name());
+                let same = match (hit, nearest) {
+                    (Some(hit), Some((t, triangle))) if hit.triangle == triangle => {
+                        (f64::from(hit.t) - t).abs() < 16.0 * f64::from(f32::EPSILON) * t.max(1.0)
+                    }
+                    (None, None) => true,
+                    _ => false,
+                };
+                if same {
+                    continue;
+                }
+                // Then the ray must be one on which f32 has a choice, and the answer one of those it may give.
+                if let Err(wrong) = verdict(&examine(&meshes, ray), ray, hit.as_ref(), backend == Backend::Embree) {
+                    panic!("{}: {ray:?}\nfound {hit:?}\n{wrong}", backend.name());
+                }
+                others += u32::from(hit.is_some() && nearest.is_some());
+                one_sided += u32::from(hit.is_some() != nearest.is_some());
+            }
+        }
+        println!(
+            "{}: {count} rays, {hits} hits; other triangle or distance {others}, hit against miss {one_sided} ({:.1e})",
+            backend.name(),
+            f64::from(one_sided) * share
+        );
+        assert!(hits > count / 2);
+        // A ray in a million; six standard errors more for few rays.
+        let expected = 1e-6 * f64::from(count);
+        assert!(f64::from(one_sided) < expected + 6.0 * expected.sqrt(), "{}: {one_sided}", backend.name());
+    }
+}
+
+#[test]
+fn hits_and_misses_are_those_of_f64() {
+    against_f64(100_000);
+}
+
+/// For the figures in docs/rays.md: in a release build half a minute.
+#[test]
+#[ignore = "a measurement"]
+fn hits_and_misses_are_those_of_f64_ten_million_times() {
+    against_f64(10_000_000);
+}
+
+/// Rays from within a closed mesh, half of them at points of edges: how many find a way out.
+fn leaks(count: u32) {
+    let mesh = bumpy_sphere(40);
+    let query = backends(&[&mesh]);
+    for (backend, query) in query {
+        let mut draws = Draws::new(12);
+        let mut leaks = 0;
+        let mut batch: Vec<Ray> = Vec::with_capacity(1000);
+        let mut hits = vec![None; 1000];
+        for _ in 0..count / 1000 {
+            batch.clear();
+            let from = draws.point() * 0.4;
+            batch.extend((0..1000).map(|i| {
+                let direction = if i % 2 == 0 {
+                    draws.direction()
+                } else {
+                    let [a, b, _] = mesh.corners(draws.below(mesh.triangles.len()) as u32);
+                    a + (b - a) * draws.unit() - from
+                };
+                Ray::new(from, direction)
+            }));
+            query.closest_batch(&batch, &mut hits);
+            leaks += hits.iter().filter(|h| h.is_none()).count();
+        }
+        println!("{}: {leaks} of {count} rays leave a closed mesh", backend.name());
+        assert_eq!(leaks, 0, "{}", backend.name());
+    }
+}
+
+#[test]
+fn a_million_rays_do_not_leave_a_closed_mesh() {
+    leaks(1_000_000);
+}
+
+/// For the figures in docs/rays.md: in a release build a minute.
+#[test]
+#[ignore = "a measurement"]
+fn a_hundred_million_rays_do_not_leave_a_closed_mesh() {
+    leaks(100_000_000);
+}
+
+/// Batches of camera rays, which backends trace together, are the single rays: also at other scales, across the axes, and
+/// with intervals that end before, on and behind the surface.
+#[test]
+fn batches_from_one_point_are_the_rays_alone() {
+    for scale in [1e-6, 1.0, 1e6] {
+        let mesh = placed(&bumpy_sphere(30), scale, Vec3::ZERO);
+        let mut draws = Draws::new(13);
+        let mut rays = Vec::new();
+        for forward in [Vec3::Z, -Vec3::X, Vec3::new(1.0, 1.0, 0.9), Vec3::new(-0.3, -1.0, 0.4)] {
+            let eye = forward * -2.0 * scale;
+            let (right, up) = forward.any_orthonormal_pair();
+            for i in 0..40 * 40 {
+                let [x, y] = [i % 40, i / 40].map(|k| k as f32 * 0.04 - 0.8);
+                let t_max = [f32::INFINITY, 1.0, scale, 1.5 * scale][i % 4];
+                rays.push(Ray { t_max, ..Ray::new(eye, forward + right * x + up * y) });
+            }
+            // And as many without order.
+            rays.extend((0..500).map(|_| Ray::new(draws.point() * scale, draws.direction())));
+        }
+        for (backend, query) in backends(&[&mesh]) {
+            for length in [rays.len(), 1, 7, 100] {
+                let (mut hits, mut occluded, mut ties) = (vec![None; length], vec![false; length], 0);
+                query.closest_batch(&rays[..length], &mut hits);
+                query.occluded_batch(&rays[..length], &mut occluded);
+                for (i, ray) in rays[..length].iter().enumerate() {
+                    let alone = query.closest(ray);
+                    assert_eq!(occluded[i], alone.is_some(), "{} at {scale}: {ray:?}", backend.name());
+                    if backend == Backend::Embree && hits[i] != alone {
+                        // On a shared edge its packets may choose the other triangle.
+                        ties += 1;
+                        verdict(&examine(&[&mesh], ray), ray, hits[i].as_ref(), true).unwrap();
+                    } else {
+                        assert_eq!(hits[i], alone, "{} at {scale}: {ray:?}", backend.name());
+                    }
+                }
+                assert!(ties <= length / 100, "{ties} of {length}");
+            }
+        }
     }
 }

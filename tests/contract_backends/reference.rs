@@ -106,6 +106,27 @@ fn examine_one(mesh: &Mesh, mesh_number: u32, triangle: u32, ray: &Ray) -> Exam 
     }
 }
 
+/// The nearest hit by [MT97] in f64: distance and triangle.
+pub fn nearest_in_f64(mesh: &Mesh, ray: &Ray) -> Option<(f64, u32)> {
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let mut nearest: Option<(f64, u32)> = None;
+    for triangle in 0..mesh.triangles.len() as u32 {
+        let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
+        let (ab, ac, from) = (b - a, c - a, origin - a);
+        let across = direction.cross(ac);
+        let inverse = 1.0 / ab.dot(across);
+        let u = from.dot(across) * inverse;
+        let across = from.cross(ab);
+        let v = direction.dot(across) * inverse;
+        let t = ac.dot(across) * inverse;
+        let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
+        if inside && t > f64::from(ray.t_min) && t < f64::from(ray.t_max) && nearest.is_none_or(|n| t < n.0) {
+            nearest = Some((t, triangle));
+        }
+    }
+    nearest
+}
+
 /// What is wrong with a backend's answer, if anything is; `by_plane` says how it computes distances.
 pub fn verdict(exams: &[Exam], ray: &Ray, found: Option<&Hit>, by_plane: bool) -> Result<(), String> {
     let error = |e: &Exam| if by_plane { e.t_error_by_plane } else { e.t_error };

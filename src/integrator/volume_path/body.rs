@@ -25,10 +25,12 @@ pub struct Body {
     pub clearance: Clearance,
     /// Smallest extinction of the channels with any [1/unit]; 0 without a medium.
     pub least_extinction: f32,
+    /// Whether the medium goes on beyond the object's box: sheets and meshes with holes.
+    pub endless: bool,
     /// Lamps to aim at.
     pub aims: Vec<Aim>,
     /// Collisions between two looks at the weight.
-    patience: u32,
+    pub patience: u32,
 }
 
 /// The straight flight between two collisions.
@@ -91,6 +93,7 @@ impl Body {
             medium: coefficients,
             phase: HenyeyGreenstein { g: medium.g },
             clearance,
+            endless: false,
             aims,
         }
     }
@@ -123,7 +126,7 @@ impl Body {
         tally.rays += 1;
         let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
             let x = from + w * distance;
-            return if self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
+            return if self.endless || self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
         };
         let object = &view.scene.objects[hit.mesh as usize];
         let at = object.mesh.point(hit.triangle, hit.u, hit.v);

@@ -11,7 +11,7 @@ use crate::geometry::SurfacePoint;
 use crate::integrator::{Tally, View, WalkTally};
 use crate::light::emitted;
 use crate::math::{Rgb, Vec3};
-use crate::optics::{reflect, reflectance, refract};
+use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::{Orders, Surface};
@@ -66,6 +66,18 @@ impl<'a> CameraPath<'a> {
                 return;
             }
             ray = next;
+        }
+    }
+
+    /// Adds what shines at the end of `ray`, and nothing else.
+    pub fn meet_light(&mut self, ray: &Ray) {
+        self.tally.rays.bounce += 1;
+        match self.view.rays.closest(ray) {
+            None => self.add(self.spectrum.value_outside() * self.method.light.lights.environment()),
+            Some(hit) if self.aimed.iter().all(|aim| aim.object != hit.mesh) => {
+                self.add(self.spectrum.value_outside() * emitted(self.view.scene, &hit, ray.direction));
+            }
+            Some(_) => {}
         }
     }
 
@@ -167,8 +179,8 @@ impl Watch for Gather<'_, '_> {
         if path.method.options.orders.none_above(path.order) {
             return false;
         }
-        let photons =
-            path.method.sources[body.object as usize].as_ref().zip(path.photons[body.object as usize].as_ref());
+        let (source, cells) = (&path.method.sources[body.object as usize], path.photons.get(body.object as usize));
+        let photons = source.as_ref().zip(cells.and_then(Option::as_ref));
         if let (Some((source, _)), Some(edge), true) = (photons, edge, path.direct > 0.0) {
             let share = walked_share(source.yielding, source.reach, edge.length, edge.phase);
             if share < 1.0 && draws.number() >= share {
@@ -224,25 +236,30 @@ pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, dire
     if !path.faces(hit, direction) {
         return;
     }
-    let at = path.view.point(hit, direction);
-    // As in `subsurface`: what leaves towards the viewer is shaded with the interpolated normal.
-    let n = at.normal_seen_from(-direction);
-    let mirrored = reflectance(body.eta, -n.dot(direction));
     let (spectrum, draws) = (path.spectrum, path.draws.clone());
-    if path.method.options.specular && mirrored > 0.0 {
-        path.spectrum.scale(Rgb::splat(mirrored));
+    if path.method.options.specular {
+        let at = path.view.point(hit, direction);
+        let n = at.normal_seen_from(-direction);
+        path.spectrum.scale(Rgb::splat(reflectance(body.eta, -n.dot(direction))));
         let w = reflect(-direction, n);
         path.draws = draws.fork(1);
         path.trace(Ray::new(at.leave(w), w));
     }
     (path.spectrum, path.draws) = (spectrum, draws);
     (path.direct, path.other, path.order, path.meets_lamps) = (1.0, 1.0, 0, true);
-    let refracted = refract(-direction, n, body.eta).filter(|w| w.dot(at.n_geometric) < 0.0);
-    let Some(w) = refracted.or_else(|| refract(-direction, at.n_geometric, body.eta)) else { return };
-    if mirrored < 1.0 {
-        path.spectrum.scale(Rgb::splat(1.0 - mirrored));
-        if let Some(ray) = path.inside(body, &at, w) {
-            path.trace(ray);
-        }
+    if let Some(ray) = enter(path, body, hit, direction) {
+        path.trace(ray);
     }
+}
+
+/// From the camera into a body and through it; the ray on which the path leaves.
+pub fn enter<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) -> Option<Ray> {
+    let at = path.view.point(hit, direction);
+    // As in `subsurface`: what leaves towards the viewer is shaded with the interpolated normal.
+    let n = at.normal_seen_from(-direction);
+    let passed = transmittance(body.eta, -n.dot(direction));
+    let refracted = refract(-direction, n, body.eta).filter(|w| w.dot(at.n_geometric) < 0.0);
+    let w = refracted.or_else(|| refract(-direction, at.n_geometric, body.eta))?;
+    path.spectrum.scale(Rgb::splat(passed));
+    if passed > 0.0 { path.inside(body, &at, w) } else { None }
 }

@@ -18,10 +18,11 @@ use crate::error::{Error, Result};
 use crate::geometry::Clearance;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
-use crate::query::RayTally;
+use crate::query::{Hit, RayTally};
+use crate::sampling::PixelStream;
 use crate::scene::{Orders, Scene, Surface};
 use body::Body;
-use camera::{CameraPath, both_parts};
+use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 use connect::Scratch;
 use draws::Draws;
@@ -73,7 +74,7 @@ impl VolumePath {
             )));
         }
         let lights = Lights::new(scene);
-        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(|i| body(scene, i)).collect();
+        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(|i| body(scene, i, CLEARANCE_CELLS)).collect();
         let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
         let source = |body: &Option<Body>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && lights.has_emitters())?;
@@ -99,17 +100,33 @@ impl VolumePath {
         ray: &CameraRay,
         scratch: &mut Scratch,
         tally: &mut Tally,
-        hit: &crate::query::Hit,
+        hit: &Hit,
     ) -> Rgb {
         let direction = ray.ray.direction;
-        let mut stream = ray.stream;
+        let mut path = self.path(view, pass, ray.stream, scratch, tally);
+        match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
+            (Some(body), _) => both_parts(&mut path, body, hit, direction),
+            (None, Surface::Emissive { .. }) => path.radiance = self.of_order_0(emitted(view.scene, hit, direction)),
+            _ => path.resume(hit, direction),
+        }
+        path.radiance
+    }
+
+    /// A path that has not left the camera yet.
+    fn path<'a>(
+        &'a self,
+        view: View<'a>,
+        photons: &'a [Option<Cells>],
+        mut stream: PixelStream,
+        scratch: &'a mut Scratch,
+        tally: &'a mut Tally,
+    ) -> CameraPath<'a> {
         let ([a, b], [c, d]) = (stream.next_2d(), stream.next_2d());
-        let key = stream.key();
-        let mut draws = Draws::new(&[a, b, c, d], key);
-        let mut path = CameraPath {
+        let mut draws = Draws::new(&[a, b, c, d], stream.key());
+        CameraPath {
             method: self,
             view,
-            photons: pass,
+            photons,
             scratch,
             tally,
             coins: draws.fork(0),
@@ -121,11 +138,33 @@ impl VolumePath {
             meets_lamps: true,
             aimed: &[],
             radiance: Rgb::BLACK,
-        };
-        match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
-            (Some(body), _) => both_parts(&mut path, body, hit, direction),
-            (None, Surface::Emissive { .. }) => path.radiance = self.of_order_0(emitted(view.scene, hit, direction)),
-            _ => path.resume(hit, direction),
+        }
+    }
+
+    /// What a model of orders 2 and higher leaves out, for the objects that `wanted` names; see `single.rs`. Holes of
+    /// meshes and objects in one another are no fault here.
+    pub(super) fn once(scene: &Scene, wanted: impl Fn(usize) -> bool, seed: u64) -> Self {
+        let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
+        let endless = |body: Body| Body { endless: true, ..body };
+        let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
+        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
+        let sources = bodies.iter().map(|_| None).collect();
+        Self {
+            options,
+            light: DirectLight { lights: Lights::new(scene), samples: 1 },
+            bodies,
+            sources,
+            persistence: 1.0,
+        }
+    }
+
+    /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
+    pub(super) fn scattered_once(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, tally: &mut Tally) -> Rgb {
+        let Some(body) = &self.bodies[hit.mesh as usize] else { return Rgb::BLACK };
+        let mut scratch = Scratch::default();
+        let mut path = self.path(view, &[], ray.stream.split(0, 1), &mut scratch, tally);
+        if let Some(out) = enter(&mut path, body, hit, ray.ray.direction) {
+            path.meet_light(&out);
         }
         path.radiance
     }
@@ -136,12 +175,12 @@ impl VolumePath {
 }
 
 /// The body of object number `index`, where it is translucent and has a size.
-fn body(scene: &Scene, index: usize) -> Option<Body> {
+fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
     let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
     let (lo, hi) = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
-    let clearance = Clearance::new(meshes, lo, hi, CLEARANCE_CELLS);
+    let clearance = Clearance::new(meshes, lo, hi, cells);
     Some(Body::new(index as u32, &t.medium, clearance, aim::aims(scene, index as u32)))
 }
 

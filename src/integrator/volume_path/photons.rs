@@ -10,7 +10,7 @@ use crate::light::{Arrival, Lights};
 use crate::math::{Rgb, Vec3, hash_combine};
 use crate::optics::{refract, transmittance};
 use crate::query::RayTally;
-use crate::sampling::{CacheStream, Points};
+use crate::sampling::{CacheStream, Points, Turn};
 use crate::scene::Scene;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -31,9 +31,9 @@ pub struct Source {
     /// Points of the body's surface.
     pub table: AreaTable,
     /// Numbers of the points and of the light that reaches them.
-    pub stream: CacheStream,
-    /// Key of all other numbers.
-    pub key: u64,
+    pub streams: [CacheStream; Turn::STREAMS],
+    /// Seed of them and of all other numbers.
+    pub seed: u64,
     /// Photons traced in a pass.
     pub count: u32,
     /// Connections reach this far [unit].
@@ -51,12 +51,12 @@ impl Source {
     /// `None` where no lamp shines on the object. `count` photons a pass; `reach` [unit].
     pub fn new(scene: &Scene, body: &Body, lights: &Lights, count: u32, reach: f32, seed: u64) -> Option<Self> {
         let table = AreaTable::new(&scene.objects[body.object as usize].mesh)?;
-        let key = hash_combine(hash_combine(seed, 0x7068_6f74_6f6e), u64::from(body.object));
-        let stream = CacheStream::new(Points::Sobol, key, 0);
-        let mut source = Self { table, stream, key, count, reach, yielding: 0.0 };
+        let seed = hash_combine(hash_combine(seed, 0x7068_6f74_6f6e), u64::from(body.object));
+        let streams = Turn::seeds(seed).map(|seed| CacheStream::new(Points::Sobol, seed, 0));
+        let mut source = Self { table, streams, seed, count, reach, yielding: 0.0 };
         // Light that would arrive without anything in its way; by numbers that no photon uses, for shares of connections
         // that depended on the photons would not be fair.
-        let pilot = CacheStream::new(Points::Sobol, key, 1);
+        let pilot = CacheStream::new(Points::Sobol, seed, 1);
         let arrivals = (0..PILOT).filter_map(|i| source.arrival(scene, body, lights, pilot.numbers(i)));
         let flux = arrivals.map(|(_, _, flux)| flux.mean()).sum::<f32>() / PILOT as f32;
         let per_photon = flux / (lights.mean_radiance() * count as f32);
@@ -73,14 +73,15 @@ impl Source {
         pass: u32,
         tally: &mut (RayTally, WalkTally),
     ) -> Cells {
-        let first = u64::from(pass) * u64::from(self.count);
+        let turn = Turn::of(self.seed, pass);
+        let first = u64::from(turn.number) * u64::from(self.count);
         let chunks: Vec<(Vec<Photon>, RayTally, WalkTally)> = (0..u64::from(self.count).div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let numbers = chunk * CHUNK..((chunk + 1) * CHUNK).min(u64::from(self.count));
                 let (mut photons, mut rays, mut walks) = (Vec::new(), RayTally::default(), WalkTally::default());
                 for number in numbers {
-                    self.photon(view, body, lights, first + number, &mut photons, &mut rays, &mut walks);
+                    self.photon(view, body, lights, (turn, first + number), &mut photons, &mut rays, &mut walks);
                 }
                 (photons, rays, walks)
             })
@@ -116,12 +117,12 @@ impl Source {
         view: View<'_>,
         body: &Body,
         lights: &Lights,
-        number: u64,
+        (turn, number): (Turn, u64),
         photons: &mut Vec<Photon>,
         rays: &mut RayTally,
         walks: &mut WalkTally,
     ) {
-        let numbers = self.stream.numbers(number);
+        let numbers = self.streams[turn.stream].numbers(number);
         let Some((at, arrival, flux)) = self.arrival(view.scene, body, lights, numbers) else { return };
         let Some(w) = refract(arrival.w, at.n, body.eta) else { return };
         if flux.is_black() {
@@ -131,7 +132,7 @@ impl Source {
         if view.rays.occluded(&arrival.shadow) {
             return;
         }
-        let key = hash_combine(self.key, number);
+        let key = hash_combine(turn.seed, number);
         let mut draws = Draws::new(&numbers.1[5..], key);
         let coins = draws.fork(0);
         let mut spectrum = Spectrum::new(flux * (1.0 / self.count as f32), draws.number());

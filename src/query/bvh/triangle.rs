@@ -1,27 +1,26 @@
-//! The watertight test of a ray against triangles [Woop, Benthin, Wald 2013], four at once.
+//! The watertight test of rays against triangles [WBW13], eight at once.
 //!
 //! The ray is sheared onto an axis; then the signs of three edge functions say whether it passes inside. Two triangles
 //! compute the edge they share from the same rounded numbers, and the sign of a difference of two rounded products is right
 //! or zero: so no ray slips between them. Where the sign is zero, or f32 cannot hold the values, f64 decides: it holds the
 //! products exactly. Nothing here depends on the scale of the scene.
 
-use glam::Vec4;
-
 use super::super::Ray;
-use crate::math::Vec3;
+use crate::math::{F8, Simd, Vec3, splat3};
 
 /// Triangles in one pack.
-pub const LANES: usize = 4;
+pub const LANES: usize = 8;
 
-/// Four triangles: coordinates by corner, then axis, then triangle [unit]. Places left over repeat the first triangle.
+/// Eight triangles: coordinates by corner, then axis, then triangle [unit]. Places left over repeat the first triangle.
 #[derive(Clone, Debug)]
-#[repr(C, align(16))]
+#[repr(C, align(32))]
 pub struct Pack {
-    corners: [[Vec4; 3]; 3],
+    corners: [[[f32; LANES]; 3]; 3],
 }
 
-/// A hit in a pack.
-pub struct PackHit {
+/// A hit of one lane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LaneHit {
     pub t: f32,
     pub lane: usize,
     /// Weight of the second corner.
@@ -30,111 +29,165 @@ pub struct PackHit {
     pub v: f32,
 }
 
-/// A ray as the triangle test wants it.
-pub struct TriangleRay {
-    origin: [f32; 3],
+/// The axes and the shear of one ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Shear {
     /// The two axes across the ray and the one along it, where the direction is longest.
-    axes: [usize; 3],
+    pub axes: [usize; 3],
     /// direction\[axes\[0\]\], direction\[axes\[1\]\] and 1, all over direction\[axes\[2\]\].
-    shear: [f32; 3],
+    pub by: [f32; 3],
 }
 
-impl TriangleRay {
-    #[inline]
+/// The axis along which a direction is longest.
+#[inline(always)]
+pub fn longest_axis(direction: Vec3) -> usize {
+    let [x, y, z] = direction.abs().to_array();
+    if x > y && x > z {
+        0
+    } else if y > z {
+        1
+    } else {
+        2
+    }
+}
+
+impl Shear {
+    #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
         let d = ray.direction.to_array();
-        let size = d.map(f32::abs);
-        let along = if size[0] > size[1] && size[0] > size[2] {
-            0
-        } else if size[1] > size[2] {
-            1
-        } else {
-            2
-        };
+        let along = longest_axis(ray.direction);
         let axes = [(along + 1) % 3, (along + 2) % 3, along];
-        let shear = [d[axes[0]] / d[along], d[axes[1]] / d[along], 1.0 / d[along]];
-        Self { origin: ray.origin.to_array(), axes, shear }
+        Self { axes, by: [d[axes[0]] / d[along], d[axes[1]] / d[along], 1.0 / d[along]] }
     }
+}
+
+/// Eight pairs of a ray and a triangle: one ray with eight triangles, or eight rays with one. All rays have the same axes.
+#[derive(Clone, Copy)]
+pub struct Sheared<S: Simd> {
+    /// Start, in the order of the axes [unit].
+    pub origin: [F8<S>; 3],
+    /// [`Shear::by`].
+    pub by: [F8<S>; 3],
 }
 
 /// Sizes of the determinant [unit²] between which f32 computes weights and distance without overflow, and without losing
 /// bits to numbers below the normal ones.
 const F32_RANGE: std::ops::Range<f32> = 1e-30..1e30;
 
-/// The corners across the ray, by triangle.
-struct Sheared {
-    x: [Vec4; 3],
-    y: [Vec4; 3],
+/// One number for each corner of each triangle.
+type ByCorner<S> = [F8<S>; 3];
+
+/// Triangles that the rays pass inside, or may.
+pub struct Inside<S: Simd> {
+    x: ByCorner<S>,
+    y: ByCorner<S>,
+    z: ByCorner<S>,
+    edges: ByCorner<S>,
+    /// Bits of the lanes.
+    pub lanes: u32,
 }
 
-/// One number for each corner of each triangle.
-type ByCorner = [Vec4; 3];
+/// Distances of the lanes that are left, and the weights of the second and third corner.
+pub struct Met {
+    pub lanes: u32,
+    pub t: [f32; LANES],
+    pub u: [f32; LANES],
+    pub v: [f32; LANES],
+}
 
-impl Pack {
-    /// A pack of one to four triangles.
-    pub fn new(triangles: &[[Vec3; 3]]) -> Self {
-        let of = |lane: usize| triangles.get(lane).unwrap_or(&triangles[0]);
-        Self {
-            corners: std::array::from_fn(|c| {
-                std::array::from_fn(|axis| Vec4::from_array(std::array::from_fn(|lane| of(lane)[c][axis])))
-            }),
-        }
+impl<S: Simd> Sheared<S> {
+    /// The lanes whose signs do not rule the triangle out. Coordinates by corner, then axis, in the order of the axes.
+    #[inline(always)]
+    pub fn inside(&self, corners: [[F8<S>; 3]; 3]) -> Inside<S> {
+        let (p, [ox, oy, oz], [bx, by, _]) = (corners, self.origin, self.by);
+        let z = [p[0][2] - oz, p[1][2] - oz, p[2][2] - oz];
+        let x = [p[0][0] - ox - bx * z[0], p[1][0] - ox - bx * z[1], p[2][0] - ox - bx * z[2]];
+        let y = [p[0][1] - oy - by * z[0], p[1][1] - oy - by * z[1], p[2][1] - oy - by * z[2]];
+        // Barycentric weights times the determinant.
+        let edges = [x[2] * y[1] - y[2] * x[1], x[0] * y[2] - y[0] * x[2], x[1] * y[0] - y[1] * x[0]];
+        // Outside if two edges have different signs; zeros are looked at again, and so is what is not a number.
+        let [a, b, c] = edges;
+        let zero = F8::splat(a.simd(), 0.0);
+        let below = a.min(b.min(c.min(zero))).lt(zero);
+        let above = zero.lt(a.max(b.max(c.max(zero))));
+        Inside { x, y, z, edges, lanes: !(below & above) & 0xff }
     }
 
-    /// The nearest hit with `t_min` < t < `t_max`, on either face.
-    #[inline]
-    pub fn closest(&self, ray: &TriangleRay, t_min: f32, t_max: f32) -> Option<PackHit> {
-        let [kx, ky, kz] = ray.axes;
-        let from_origin = |c: usize, k: usize| self.corners[c][k] - Vec4::splat(ray.origin[k]);
-        let z: ByCorner = std::array::from_fn(|c| from_origin(c, kz));
-        let across = |k: usize, shear: f32| -> ByCorner {
-            std::array::from_fn(|c| from_origin(c, k) - Vec4::splat(shear) * z[c])
+    /// Distances and weights of the lanes that `inside` has left and the interval allows: beyond `t_min`, before `t_end`.
+    /// No triangle is nearer than `enters`, where the ray enters its box: so what is found does not depend on the order
+    /// in which boxes are visited.
+    #[inline(always)]
+    pub fn meet(&self, inside: &Inside<S>, enters: F8<S>, t_min: F8<S>, t_end: F8<S>) -> Met {
+        let simd = enters.simd();
+        let [a, b, c] = inside.edges;
+        let det = a + b + c;
+        let size = det.abs();
+        let least_edge = a.abs().min(b.abs().min(c.abs()));
+        let sure = F8::splat(simd, 0.0).lt(least_edge)
+            & F8::splat(simd, F32_RANGE.start).le(size)
+            & size.lt(F8::splat(simd, F32_RANGE.end));
+        let inverse = F8::splat(simd, 1.0) / det;
+        let (w, u, v) = (a * inverse, b * inverse, c * inverse);
+        let t = (w * inside.z[0] + u * inside.z[1] + v * inside.z[2]) * self.by[2];
+        let t = t.max(enters);
+        let met = Met {
+            lanes: inside.lanes & (t_min.lt(t) & t.lt(t_end) | !sure),
+            t: t.to_array(),
+            u: u.to_array(),
+            v: v.to_array(),
         };
-        let sheared = Sheared { x: across(kx, ray.shear[0]), y: across(ky, ray.shear[1]) };
-        // Barycentric weights times the determinant.
-        let edges: ByCorner = std::array::from_fn(|c| {
-            let (from, to) = ((c + 1) % 3, (c + 2) % 3);
-            sheared.x[to] * sheared.y[from] - sheared.y[to] * sheared.x[from]
-        });
-        // Outside if two edges have different signs; zeros and what is not a number are looked at again.
-        let [a, b, c] = edges;
-        let below = a.cmplt(Vec4::ZERO) | b.cmplt(Vec4::ZERO) | c.cmplt(Vec4::ZERO);
-        let above = a.cmpgt(Vec4::ZERO) | b.cmpgt(Vec4::ZERO) | c.cmpgt(Vec4::ZERO);
-        let mut candidates = !(below & above).bitmask() & 0b1111;
-        let mut best = None;
-        let mut t_max = t_max;
-        while candidates != 0 {
-            let lane = candidates.trailing_zeros() as usize;
-            candidates &= candidates - 1;
-            let Some((t, u, v)) = finish(&sheared, &edges, &z, ray.shear[2], lane) else { continue };
-            if t > t_min && t < t_max {
-                t_max = t;
-                best = Some(PackHit { t, lane, u, v });
+        let unsure = inside.lanes & !sure;
+        if unsure == 0 {
+            return met;
+        }
+        let (x, y, z) = (inside.x, inside.y, inside.z);
+        let open = Open {
+            unsure,
+            x: [x[0].to_array(), x[1].to_array(), x[2].to_array()],
+            y: [y[0].to_array(), y[1].to_array(), y[2].to_array()],
+            z: [z[0].to_array(), z[1].to_array(), z[2].to_array()],
+            per_z: self.by[2].to_array(),
+            enters: enters.to_array(),
+            t_min: t_min.to_array(),
+            t_end: t_end.to_array(),
+        };
+        open.decide(met)
+    }
+}
+
+/// Lanes that f32 cannot decide, as plain numbers.
+struct Open {
+    unsure: u32,
+    x: [[f32; LANES]; 3],
+    y: [[f32; LANES]; 3],
+    z: [[f32; LANES]; 3],
+    per_z: [f32; LANES],
+    enters: [f32; LANES],
+    t_min: [f32; LANES],
+    t_end: [f32; LANES],
+}
+
+impl Open {
+    /// The same in f64, signs and all.
+    #[cold]
+    #[inline(never)]
+    fn decide(&self, mut met: Met) -> Met {
+        for lane in (0..LANES).filter(|lane| self.unsure & 1 << lane != 0) {
+            let of = |by_corner: &[[f32; LANES]; 3]| by_corner.map(|at| f64::from(at[lane]));
+            let found = exactly(of(&self.x), of(&self.y), of(&self.z), f64::from(self.per_z[lane]));
+            let (t, u, v) = found.unwrap_or((f32::NAN, 0.0, 0.0));
+            let t = if t < self.enters[lane] { self.enters[lane] } else { t };
+            (met.t[lane], met.u[lane], met.v[lane]) = (t, u, v);
+            if !(t > self.t_min[lane] && t < self.t_end[lane]) {
+                met.lanes &= !(1 << lane);
             }
         }
-        best
+        met
     }
 }
 
-/// Distance and weights of a triangle that the signs have not ruled out.
-#[inline]
-fn finish(sheared: &Sheared, edges: &ByCorner, z: &ByCorner, per_z: f32, lane: usize) -> Option<(f32, f32, f32)> {
-    let e = edges.map(|edge| edge[lane]);
-    let det = e[0] + e[1] + e[2];
-    if e[0] == 0.0 || e[1] == 0.0 || e[2] == 0.0 || !F32_RANGE.contains(&det.abs()) {
-        return finish_exactly(sheared, z, per_z, lane);
-    }
-    let inverse = 1.0 / det;
-    let w = e.map(|e| e * inverse);
-    let t = (w[0] * z[0][lane] + w[1] * z[1][lane] + w[2] * z[2][lane]) * per_z;
-    Some((t, w[1], w[2]))
-}
-
-/// The same in f64, signs and all.
-#[cold]
-fn finish_exactly(sheared: &Sheared, z: &ByCorner, per_z: f32, lane: usize) -> Option<(f32, f32, f32)> {
-    let x = sheared.x.map(|x| f64::from(x[lane]));
-    let y = sheared.y.map(|y| f64::from(y[lane]));
+/// Distance and weights of one triangle; `None` beside it, or in its plane: such a ray meets its edge only.
+fn exactly(x: [f64; 3], y: [f64; 3], z: [f64; 3], per_z: f64) -> Option<(f32, f32, f32)> {
     let e: [f64; 3] = std::array::from_fn(|c| {
         let (from, to) = ((c + 1) % 3, (c + 2) % 3);
         x[to] * y[from] - y[to] * x[from]
@@ -142,21 +195,124 @@ fn finish_exactly(sheared: &Sheared, z: &ByCorner, per_z: f32, lane: usize) -> O
     let outside = e.iter().any(|&e| e < 0.0) && e.iter().any(|&e| e > 0.0);
     let det = e[0] + e[1] + e[2];
     if outside || det == 0.0 {
-        return None; // a ray in the plane of the triangle meets its edge only
+        return None;
     }
     let w = e.map(|e| e / det);
-    let depth: f64 = (0..3).map(|c| w[c] * f64::from(z[c][lane])).sum();
-    Some(((depth * f64::from(per_z)) as f32, w[1] as f32, w[2] as f32))
+    let depth: f64 = (0..3).map(|c| w[c] * z[c]).sum();
+    Some(((depth * per_z) as f32, w[1] as f32, w[2] as f32))
+}
+
+impl Met {
+    /// The nearest of the lanes; of several at one distance the first.
+    #[inline(always)]
+    pub fn nearest(&self) -> Option<LaneHit> {
+        let mut lanes = self.lanes;
+        let mut best = None;
+        let mut t_best = f32::INFINITY;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LANES;
+            lanes &= lanes - 1;
+            if self.t[lane] < t_best {
+                t_best = self.t[lane];
+                best = Some(LaneHit { t: t_best, lane, u: self.u[lane], v: self.v[lane] });
+            }
+        }
+        best
+    }
+}
+
+/// One ray as the test of a pack wants it.
+pub struct TriangleRay<S: Simd> {
+    sheared: Sheared<S>,
+    axes: [usize; 3],
+    t_min: F8<S>,
+    simd: S,
+}
+
+impl<S: Simd> TriangleRay<S> {
+    #[inline(always)]
+    pub fn new(simd: S, ray: &Ray) -> Self {
+        let Shear { axes, by } = Shear::new(ray);
+        let origin = ray.origin.to_array();
+        Self {
+            sheared: Sheared {
+                origin: splat3(simd, [origin[axes[0]], origin[axes[1]], origin[axes[2]]]),
+                by: splat3(simd, by),
+            },
+            axes,
+            t_min: F8::splat(simd, ray.t_min),
+            simd,
+        }
+    }
+}
+
+impl Pack {
+    /// A pack of one to eight triangles.
+    pub fn new(triangles: &[[Vec3; 3]]) -> Self {
+        let of = |lane: usize| triangles.get(lane).unwrap_or(&triangles[0]);
+        Self {
+            corners: std::array::from_fn(|c| std::array::from_fn(|axis| std::array::from_fn(|lane| of(lane)[c][axis]))),
+        }
+    }
+
+    /// The hits with `t_min` < t < `t_end`, on either face, by a ray that enters the pack's box at `enters`.
+    #[inline(always)]
+    pub fn meet<S: Simd>(&self, ray: &TriangleRay<S>, enters: f32, t_end: f32) -> Option<Met> {
+        let [kx, ky, kz] = ray.axes;
+        let corner = |c: usize| [self.load(ray.simd, c, kx), self.load(ray.simd, c, ky), self.load(ray.simd, c, kz)];
+        let inside = ray.sheared.inside([corner(0), corner(1), corner(2)]);
+        if inside.lanes == 0 {
+            return None;
+        }
+        let (enters, t_end) = (F8::splat(ray.simd, enters), F8::splat(ray.simd, t_end));
+        let met = ray.sheared.meet(&inside, enters, ray.t_min, t_end);
+        (met.lanes != 0).then_some(met)
+    }
+
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S, c: usize, k: usize) -> F8<S> {
+        F8::load(simd, &self.corners[c][k % 3])
+    }
+
+    /// The corners of triangle `lane` in every lane, by corner, then axis, in the order of `axes`.
+    #[inline(always)]
+    pub fn corners_of<S: Simd>(&self, simd: S, lane: usize, [kx, ky, kz]: [usize; 3]) -> [[F8<S>; 3]; 3] {
+        let lane = lane % LANES;
+        let [a, b, c] = &self.corners;
+        [
+            splat3(simd, [a[kx % 3][lane], a[ky % 3][lane], a[kz % 3][lane]]),
+            splat3(simd, [b[kx % 3][lane], b[ky % 3][lane], b[kz % 3][lane]]),
+            splat3(simd, [c[kx % 3][lane], c[ky % 3][lane], c[kz % 3][lane]]),
+        ]
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{LaneKernel, Lanes, Level};
 
     const RIGHT: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
-    fn hit(corners: [Vec3; 3], ray: &Ray) -> Option<PackHit> {
-        Pack::new(&[corners]).closest(&TriangleRay::new(ray), ray.t_min, ray.t_max)
+    struct Meet<'a>(&'a Pack, Ray);
+
+    impl LaneKernel for Meet<'_> {
+        type Out = Option<LaneHit>;
+        #[inline(always)]
+        fn run<S: Simd>(self, simd: S) -> Self::Out {
+            let Self(pack, ray) = self;
+            pack.meet(&TriangleRay::new(simd, &ray), ray.t_min, ray.t_max).and_then(|met| met.nearest())
+        }
+    }
+
+    fn nearest(pack: &Pack, ray: Ray) -> Option<LaneHit> {
+        let hits: Vec<_> = Level::available().into_iter().map(|l| Lanes::at(l).run(Meet(pack, ray))).collect();
+        assert!(hits.iter().all(|&h| h == hits[0]), "{hits:?}");
+        hits[0]
+    }
+
+    fn hit(corners: [Vec3; 3], ray: &Ray) -> Option<LaneHit> {
+        nearest(&Pack::new(&[corners]), *ray)
     }
 
     #[test]
@@ -175,8 +331,8 @@ mod tests {
     fn the_nearest_of_a_pack_wins_and_the_interval_is_open() {
         let at = |z: f32| RIGHT.map(|p| p + Vec3::Z * z);
         let pack = Pack::new(&[at(3.0), at(1.0), at(2.0)]);
-        let ray = TriangleRay::new(&Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::Z));
-        let t = |lo, hi| pack.closest(&ray, lo, hi).map(|h| (h.t, h.lane));
+        let ray = Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::Z);
+        let t = |t_min, t_max| nearest(&pack, Ray { t_min, t_max, ..ray }).map(|h| (h.t, h.lane));
         assert_eq!(t(0.0, f32::INFINITY), Some((1.0, 1)));
         assert_eq!(t(1.0, f32::INFINITY), Some((2.0, 2)));
         assert_eq!(t(2.0, 3.0), None);

@@ -1,0 +1,63 @@
+//! `marmor merge`: parts of one render become one.
+
+use super::outputs::{LayerName, Outputs, progress};
+use marmor::film::{Checkpoint, check_writable};
+use marmor::{Error, Result};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Options.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Film files of one render (--samples-range, --checkpoint-every, or an output that ends in .film)
+    #[arg(required = true, value_name = "PART.film")]
+    parts: Vec<PathBuf>,
+    /// Where to write; the ending .exr, .png or .film decides the format; may be given more than once
+    #[arg(short, long, required = true, value_name = "FILE")]
+    output: Vec<PathBuf>,
+    /// Further layers in the EXR, separated by commas: variance
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    layers: Vec<LayerName>,
+    /// Brighten or darken the PNG by this many stops [default: as the first part would]
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
+    exposure: Option<f64>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the command. The result is that of one render of all passes, bit for bit.
+pub fn run(args: Args) -> Result<ExitCode> {
+    for path in &args.output {
+        check_writable(path)?;
+    }
+    let mut parts = args.parts.iter();
+    let Some(first) = parts.next() else { return Err(Error::usage("nothing to merge")) };
+    let mut all = Checkpoint::read(first)?;
+    let (mut spent, exposure) = progress(&all);
+    for path in parts {
+        let part = Checkpoint::read(path)?;
+        if let Some(what) = all.identity.difference(&part.identity) {
+            let (a, b) = (first.display(), path.display());
+            return Err(Error::usage(format!("{b}: not a part of the same render as {a}: {what} ({a} is `there`)")));
+        }
+        all.film.join(&part.film).map_err(|e| e.within(path.display()))?;
+        spent.add(&progress(&part).0);
+    }
+    let Checkpoint { identity, attributes, film, .. } = all;
+    if film.passes() == 0 {
+        return Err(Error::usage("the parts have no passes: there is no picture"));
+    }
+    let exposure = args.exposure.unwrap_or(exposure);
+    let outputs = Outputs { paths: args.output, identity, attributes, exposure, layers: args.layers };
+    let said = outputs.save(&film, &spent)?;
+    if !args.quiet {
+        said.iter().for_each(|line| eprintln!("{line}"));
+        eprintln!("merged {} files: passes {} ({} in all)", args.parts.len(), film.ranges_text(), film.passes());
+        if film.ranges().len() > 1 {
+            eprintln!("warning: passes are missing between the parts");
+        }
+        eprintln!("{}", super::render::odd_line(&film, &spent, None));
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,343 @@
+//! What is wrong with a mesh, and a mended one: faces without area or there twice, holes, edges of three faces, faces
+//! that look the wrong way. Read first: [`examine`]; docs/robustness.md says what marmor does about each finding.
+
+use super::{Mesh, ObjMesh};
+use crate::math::DVec3;
+use rayon::slice::ParallelSliceMut as _;
+use serde::Serialize;
+
+/// What [`examine`] found. Vertices at exactly the same place count as one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Findings {
+    /// All triangles.
+    pub triangles: usize,
+    /// Triangles without area, repeated corners among them.
+    pub zero_area: usize,
+    /// Triangles with the same three corners as an earlier one.
+    pub duplicates: usize,
+    /// Edges of a single triangle: the rims of holes.
+    pub open_edges: usize,
+    /// Edges of more than two triangles.
+    pub non_manifold_edges: usize,
+    /// Edges whose two triangles run along them the same way: one of the two faces the wrong way.
+    pub mixed_edges: usize,
+    /// Enclosed volume [unit³], below zero if the faces look inwards; `None` where the surface has a rim, or faces of
+    /// mixed directions.
+    pub volume: Option<f64>,
+}
+
+impl Findings {
+    /// Whether a closed surface looks inwards.
+    pub fn inside_out(&self) -> bool {
+        self.volume.is_some_and(|v| v < 0.0)
+    }
+
+    /// Whether [`mended`] would change anything but holes and edges of three faces, which it leaves.
+    pub fn can_be_mended(&self) -> bool {
+        self.zero_area > 0 || self.duplicates > 0 || self.mixed_edges > 0 || self.inside_out()
+    }
+}
+
+/// Looks at the mesh as it is rendered.
+pub fn examine(mesh: &Mesh) -> Findings {
+    let point = |i: u32| mesh.positions[i as usize].as_dvec3();
+    let welded = welded(mesh.positions.len(), point);
+    let faces = Faces::new(&mesh.triangles, &welded, &point);
+    let mut found = Findings {
+        triangles: mesh.triangles.len(),
+        zero_area: faces.zero_area,
+        duplicates: mesh.triangles.len() - faces.zero_area - faces.kept.len(),
+        ..Findings::default()
+    };
+    for uses in faces.edges().chunk_by(|a, b| a.0 >> 1 == b.0 >> 1) {
+        match uses {
+            [_] => found.open_edges += 1,
+            [a, b] => found.mixed_edges += usize::from(a.0 == b.0),
+            _ => found.non_manifold_edges += 1,
+        }
+    }
+    if found.open_edges == 0 && found.mixed_edges == 0 && !faces.kept.is_empty() {
+        let all: Vec<[u32; 3]> = faces.kept.iter().map(|&t| faces.corners[t as usize]).collect();
+        found.volume = Some(volume(&all, &point));
+    }
+    found
+}
+
+/// What [`mended`] did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Mended {
+    /// Triangles without area that were removed.
+    pub zero_area: usize,
+    /// Repeated triangles that were removed.
+    pub duplicates: usize,
+    /// Triangles whose face was turned.
+    pub turned: usize,
+}
+
+/// The mesh without faces that have no area or repeat an earlier one, and with faces turned so that neighbours agree and
+/// closed parts look outwards. Parts are joined at edges of two faces. A closed part inside the box of another one is a
+/// cavity and keeps the direction that most of its faces have, as do parts with a rim. Holes stay open.
+pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
+    let point = |i: u32| mesh.positions[i as usize];
+    let welded = welded(mesh.positions.len(), point);
+    let faces = Faces::new(&mesh.triangles, &welded, &point);
+    let mut done = Mended {
+        zero_area: faces.zero_area,
+        duplicates: mesh.triangles.len() - faces.zero_area - faces.kept.len(),
+        turned: 0,
+    };
+    let turn = faces.turned(&point);
+    done.turned = turn.iter().filter(|&&t| t).count();
+    let pick = |t: u32, triple: [u32; 3]| if turn[t as usize] { [triple[0], triple[2], triple[1]] } else { triple };
+    let triangles = faces.kept.iter().map(|&t| pick(t, mesh.triangles[t as usize])).collect();
+    let normals = mesh.normals.map(|mut normals| {
+        normals.triangles =
+            faces.kept.iter().map(|&t| normals.triangles[t as usize].map(|triple| pick(t, triple))).collect();
+        normals
+    });
+    (ObjMesh { positions: mesh.positions, triangles, normals, ignored: mesh.ignored }, done)
+}
+
+/// For each vertex the first one at the same place.
+fn welded(count: usize, point: impl Fn(u32) -> DVec3) -> Vec<u32> {
+    // + 0.0 makes -0 and 0 one place.
+    let mut order: Vec<([u64; 3], u32)> =
+        (0..count as u32).map(|i| (point(i).to_array().map(|x| (x + 0.0).to_bits()), i)).collect();
+    order.par_sort_unstable();
+    let mut first_at = vec![0; count];
+    for group in order.chunk_by(|a, b| a.0 == b.0) {
+        group.iter().for_each(|&(_, i)| first_at[i as usize] = group[0].1);
+    }
+    first_at
+}
+
+/// Six times the signed volume over 6, about the first corner so that places far off lose no digits.
+fn volume(triangles: &[[u32; 3]], point: &impl Fn(u32) -> DVec3) -> f64 {
+    let Some(origin) = triangles.first().map(|t| point(t[0])) else { return 0.0 };
+    let corner = |i: u32| point(i) - origin;
+    triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))) / 6.0).sum()
+}
+
+/// The triangles that count, with welded corners.
+struct Faces {
+    corners: Vec<[u32; 3]>,
+    /// Triangles with area, each set of corners once, in order.
+    kept: Vec<u32>,
+    zero_area: usize,
+}
+
+/// Lower corner, higher corner and direction in one number, and the triangle: edges with the same corners sort together.
+type Edge = (u64, u32);
+
+impl Faces {
+    fn new(triangles: &[[u32; 3]], welded: &[u32], point: &impl Fn(u32) -> DVec3) -> Self {
+        let corners: Vec<[u32; 3]> = triangles.iter().map(|t| t.map(|i| welded[i as usize])).collect();
+        let has_area = |[a, b, c]: [u32; 3]| {
+            let (a, b, c) = (point(a), point(b), point(c));
+            (b - a).cross(c - a).length() > 0.0
+        };
+        let mut sorted: Vec<([u32; 3], u32)> = (0_u32..)
+            .zip(&corners)
+            .filter(|(_, t)| has_area(**t))
+            .map(|(i, t)| {
+                let mut key = *t;
+                key.sort_unstable();
+                (key, i)
+            })
+            .collect();
+        let zero_area = triangles.len() - sorted.len();
+        sorted.par_sort_unstable();
+        sorted.dedup_by_key(|entry| entry.0);
+        let mut kept: Vec<u32> = sorted.into_iter().map(|(_, i)| i).collect();
+        kept.sort_unstable();
+        Self { corners, kept, zero_area }
+    }
+
+    /// All edges of the kept triangles, sorted.
+    fn edges(&self) -> Vec<Edge> {
+        let mut edges: Vec<Edge> = Vec::with_capacity(3 * self.kept.len());
+        for &t in &self.kept {
+            let c = self.corners[t as usize];
+            edges.extend((0..3).map(|k| {
+                let (from, to) = (c[k], c[(k + 1) % 3]);
+                // Indices stay below 2^31: the reader of OBJ files sees to it.
+                (u64::from(from.min(to)) << 32 | u64::from(from.max(to)) << 1 | u64::from(from > to), t)
+            }));
+        }
+        edges.par_sort_unstable();
+        edges
+    }
+
+    /// For each triangle whether its face has to be turned.
+    fn turned(&self, point: &impl Fn(u32) -> DVec3) -> Vec<bool> {
+        const NONE: u32 = u32::MAX;
+        let edges = self.edges();
+        // Neighbours across edges of two triangles, and whether the two disagree.
+        let mut neighbours = vec![[(NONE, false); 3]; self.corners.len()];
+        let mut rim = vec![false; self.corners.len()];
+        for uses in edges.chunk_by(|a, b| a.0 >> 1 == b.0 >> 1) {
+            if let [a, b] = uses {
+                for (t, other) in [(a.1, b.1), (b.1, a.1)] {
+                    if let Some(free) = neighbours[t as usize].iter_mut().find(|n| n.0 == NONE) {
+                        *free = (other, a.0 == b.0);
+                    }
+                }
+            } else {
+                uses.iter().for_each(|edge| rim[edge.1 as usize] = true);
+            }
+        }
+        let mut turn = vec![false; self.corners.len()];
+        let mut seen = vec![false; self.corners.len()];
+        let mut parts: Vec<Part> = Vec::new();
+        for &start in &self.kept {
+            if std::mem::replace(&mut seen[start as usize], true) {
+                continue;
+            }
+            let mut part = Part {
+                triangles: vec![start],
+                closed: true,
+                lower: point(self.corners[start as usize][0]),
+                upper: point(self.corners[start as usize][0]),
+            };
+            let mut next = 0;
+            while let Some(&t) = part.triangles.get(next) {
+                next += 1;
+                part.closed &= !rim[t as usize];
+                for corner in self.corners[t as usize] {
+                    (part.lower, part.upper) = (part.lower.min(point(corner)), part.upper.max(point(corner)));
+                }
+                for (other, disagrees) in neighbours[t as usize] {
+                    if other != NONE && !std::mem::replace(&mut seen[other as usize], true) {
+                        turn[other as usize] = turn[t as usize] ^ disagrees;
+                        part.triangles.push(other);
+                    }
+                }
+            }
+            parts.push(part);
+        }
+        let inside = |part: &Part| {
+            parts
+                .iter()
+                .any(|other| other.closed && other.lower.cmplt(part.lower).all() && other.upper.cmpgt(part.upper).all())
+        };
+        for part in &parts {
+            let turned = part.triangles.iter().filter(|&&t| turn[t as usize]).count();
+            let flip = if part.closed && !inside(part) {
+                let faced = |&t: &u32| {
+                    let [a, b, c] = self.corners[t as usize];
+                    if turn[t as usize] { [a, c, b] } else { [a, b, c] }
+                };
+                let all: Vec<[u32; 3]> = part.triangles.iter().map(faced).collect();
+                volume(&all, point) < 0.0
+            } else {
+                2 * turned > part.triangles.len()
+            };
+            if flip {
+                part.triangles.iter().for_each(|&t| turn[t as usize] ^= true);
+            }
+        }
+        turn
+    }
+}
+
+/// Triangles joined at edges of two.
+struct Part {
+    triangles: Vec<u32>,
+    closed: bool,
+    lower: DVec3,
+    upper: DVec3,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sphere;
+    use super::*;
+
+    fn ball(radius: f64) -> ObjMesh {
+        sphere(DVec3::new(1.0, 2.0, 3.0), radius, 8, 12)
+    }
+
+    fn seen(mesh: &ObjMesh) -> Findings {
+        examine(&mesh.recentred(DVec3::ZERO))
+    }
+
+    fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
+        let base = a.positions.len() as u32;
+        a.positions.extend(&b.positions);
+        a.triangles.extend(b.triangles.iter().map(|t| t.map(|i| base + i)));
+        a.normals = None;
+        a
+    }
+
+    #[test]
+    fn a_sound_mesh_has_no_findings_and_stays_as_it_is() {
+        let mesh = ball(2.0);
+        let found = seen(&mesh);
+        assert_eq!(found, Findings { triangles: 168, volume: found.volume, ..Findings::default() });
+        assert!((found.volume.unwrap() / (4.0 / 3.0 * std::f64::consts::PI * 8.0) - 1.0).abs() < 0.2);
+        assert!(!found.can_be_mended() && !found.inside_out());
+        let (same, done) = mended(mesh.clone());
+        assert_eq!((same.triangles, done), (mesh.triangles, Mended::default()));
+    }
+
+    #[test]
+    fn every_fault_is_counted_and_mended() {
+        let mut mesh = ball(2.0);
+        let all = mesh.triangles.clone();
+        let extra = [[0, 1, 1], all[5], [all[9][1], all[9][2], all[9][0]], [all[7][0], all[7][2], all[7][1]]];
+        mesh.triangles.extend(extra);
+        for t in [3, 40, 41] {
+            mesh.triangles[t].swap(1, 2);
+        }
+        mesh.normals = None;
+        let found = seen(&mesh);
+        assert_eq!((found.zero_area, found.duplicates), (1, 3));
+        assert!(found.mixed_edges >= 3 && found.volume.is_none() && found.open_edges == 0);
+        let (mended, done) = mended(mesh);
+        assert_eq!((done, mended.triangles), (Mended { zero_area: 1, duplicates: 3, turned: 3 }, all));
+    }
+
+    #[test]
+    fn vertices_at_one_place_are_one_however_they_are_shared() {
+        let mesh = ball(1.0);
+        let soup = ObjMesh {
+            positions: mesh.triangles.iter().flatten().map(|&i| mesh.positions[i as usize]).collect(),
+            triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+            ..ObjMesh::default()
+        };
+        assert_eq!(seen(&soup), seen(&mesh));
+    }
+
+    #[test]
+    fn holes_and_edges_of_three_faces_are_counted_and_left() {
+        let mut mesh = ball(2.0);
+        mesh.normals = None;
+        mesh.triangles.remove(20);
+        let found = seen(&mesh);
+        assert_eq!((found.open_edges, found.volume, found.inside_out()), (3, None, false));
+        let tip = mesh.positions.len() as u32;
+        mesh.positions.push(DVec3::splat(9.0));
+        mesh.triangles.push([mesh.triangles[50][0], mesh.triangles[50][1], tip]);
+        let found = seen(&mesh);
+        assert_eq!((found.open_edges, found.non_manifold_edges), (5, 1));
+        assert_eq!(mended(mesh.clone()).0.triangles, mesh.triangles);
+    }
+
+    #[test]
+    fn an_inside_out_body_is_turned_and_its_cavity_is_not() {
+        let body = ball(2.0).flipped();
+        assert!(seen(&body).inside_out());
+        assert_eq!(mended(body).0.triangles, ball(2.0).triangles);
+        let hollow = joined(ball(2.0), &ball(1.0).flipped());
+        assert!(!seen(&hollow).inside_out());
+        assert_eq!(mended(hollow).1, Mended::default());
+        let both_out = joined(ball(2.0).flipped(), &ball(1.0).flipped());
+        assert_eq!(mended(both_out).1.turned, 168, "the outer one alone");
+    }
+
+    #[test]
+    fn nothing_at_all_is_no_fault() {
+        assert_eq!(seen(&ObjMesh::default()), Findings::default());
+        assert_eq!(mended(ObjMesh::default()).1, Mended::default());
+    }
+}

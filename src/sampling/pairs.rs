@@ -1,0 +1,114 @@
+//! Many first pairs of a stream's numbers at once, and directions from them: what [`PixelStream::split`], `next_2d` and
+//! `cosine_hemisphere` give one by one, to the bit, in loops that the compiler vectorises.
+
+use super::stream::PixelStream;
+use super::warp::hemisphere;
+use crate::math::{Kernel, Level, Vec3, dispatch_at};
+use sobol_burley::parts::{hash, owen_scramble_rev, u32_to_f32_norm};
+
+/// Where pairs stand in their sequences.
+#[derive(Clone, Debug, Default)]
+pub struct Pairs {
+    index: Vec<u32>,
+    seed: Vec<u32>,
+}
+
+impl Pairs {
+    /// None yet, with room for `count`.
+    pub fn with_capacity(count: usize) -> Self {
+        Self { index: Vec::with_capacity(count), seed: Vec::with_capacity(count) }
+    }
+
+    /// Adds the first pair of every part of [`PixelStream::split`] into `parts`, in order.
+    pub fn push_splits(&mut self, stream: &PixelStream, parts: u32) {
+        for (index, seed) in stream.split_places(parts) {
+            self.index.push(index);
+            self.seed.push(seed);
+        }
+    }
+
+    /// A unit direction of density cosθ/π about z for each pair, z above 0.
+    pub fn cosine_hemisphere(&self) -> Vec<Vec3> {
+        self.cosine_hemisphere_at(Level::best())
+    }
+
+    fn cosine_hemisphere_at(&self, level: Level) -> Vec<Vec3> {
+        let mut out = vec![Vec3::ZERO; self.index.len()];
+        dispatch_at(level, Directions { index: &self.index, seed: &self.seed, out: &mut out });
+        out
+    }
+}
+
+struct Directions<'a> {
+    index: &'a [u32],
+    seed: &'a [u32],
+    out: &'a mut [Vec3],
+}
+
+/// Pairs in one turn of the loop.
+const TURN: usize = 16;
+
+impl Kernel for Directions<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let all = self.index.chunks(TURN).zip(self.seed.chunks(TURN)).zip(self.out.chunks_mut(TURN));
+        for ((index, seed), out) in all {
+            let (mut i, mut s) = ([0; TURN], [0; TURN]);
+            i[..index.len()].copy_from_slice(index);
+            s[..seed.len()].copy_from_slice(seed);
+            let (mut x, mut y, mut z) = ([0.0; TURN], [0.0; TURN], [0.0; TURN]);
+            for k in 0..TURN {
+                let [u, v] = pair(i[k], s[k]);
+                [x[k], y[k], z[k]] = hemisphere([u, v]);
+            }
+            for (k, out) in out.iter_mut().enumerate() {
+                *out = Vec3::new(x[k], y[k], z[k]);
+            }
+        }
+    }
+}
+
+/// The first two dimensions of the Owen-scrambled Sobol sequence of `sobol_burley`: the first is the index itself, the
+/// second its product with Pascal's triangle modulo 2, which needs neither table nor loop.
+#[inline(always)]
+fn pair(index: u32, seed: u32) -> [f32; 2] {
+    let shuffled = owen_scramble_rev(index.reverse_bits(), hash(seed ^ 0x79c6_8e4a));
+    let first = shuffled.reverse_bits() & 0xffff;
+    let mut second = first;
+    second ^= (second & 0xaaaa) >> 1;
+    second ^= (second & 0xcccc) >> 2;
+    second ^= (second & 0xf0f0) >> 4;
+    second ^= (second & 0xff00) >> 8;
+    let seed = seed.wrapping_mul(0x9c8f_2d3b);
+    let number = |bits: u32, scramble: u32| u32_to_f32_norm(owen_scramble_rev(bits, hash(scramble)).reverse_bits());
+    [number(first, seed ^ 0x912f_69ba), number(second, seed ^ 0x174f_18ab)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cosine_hemisphere;
+    use super::*;
+    use crate::math::Frame;
+
+    #[test]
+    fn pairs_are_the_numbers_of_the_streams() {
+        let (mut pairs, mut expected) = (Pairs::default(), Vec::new());
+        let n = Vec3::new(0.6, -0.64, 0.48);
+        // Also where parts go on into the next sequence of 2^16.
+        for (pixel, sample, parts) in [(0, 0, 1), (5, 17, 4), (1 << 20, 65_535, 3), (77, 9_362, 7), (8, 70_000, 33)] {
+            let mut stream = PixelStream::new(3, pixel, sample);
+            stream.next_2d();
+            pairs.push_splits(&stream, parts);
+            expected.extend((0..parts).map(|part| cosine_hemisphere(n, stream.split(part, parts).next_2d())));
+        }
+        for level in Level::available() {
+            let got = pairs.cosine_hemisphere_at(level);
+            assert_eq!(got.len(), expected.len());
+            for (local, expected) in got.into_iter().zip(&expected) {
+                assert_eq!(Frame::about(n).to_world(local), *expected, "{level:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! What enters a body: every density of points and of directions, and the near field, give the same light.
+#![allow(clippy::unwrap_used)] // a scene that does not load has failed
+
+use marmor::bssrdf::{Bssrdf, Exit, Model, ModelName, ModelVisitor};
+use marmor::cache::{CachedSample, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
+use marmor::geometry::AreaTable;
+use marmor::light::Lights;
+use marmor::math::{Rgb, Vec3, hash};
+use marmor::optics::Medium;
+use marmor::query::{self, Backend, RayQuery, RayTally};
+use marmor::sampling::{CacheStream, Points};
+use marmor::scene::{EntrySampling, Scene, SceneFile, Spread};
+
+const MEDIUM: Medium = Medium { sigma_a: Rgb([0.01, 0.05, 0.2]), sigma_s: Rgb([0.5, 0.9, 2.0]), g: 0.0, eta: 1.3 };
+
+/// A coarse ball under a lamp that almost touches it, or one farther away.
+fn scene(height: f32, more: &str) -> Scene {
+    let text = format!(
+        "unit = \"mm\"\n[camera]\nposition = [30, 0, 0]\nlook_at = [0, 0, 0]\nfov = 30\nresolution = [64, 64]\n\
+         [[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 5\nrings = 12\nsegments = 24\nmaterial = \"wax\"\n\
+         [[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [0, {height}, 0]\nedge_u = [4, 0, 0]\nedge_v = [0, 0, 4]\nmaterial = \"lamp\"\n\
+         [material.wax]\ntype = \"translucent\"\nsigma_s_prime = 1\nsigma_a = 0.1\neta = 1.3\n\
+         [material.lamp]\ntype = \"emissive\"\nradiance = 1\ntwo_sided = true\n{more}"
+    );
+    Scene::load(&SceneFile::parse(&text, "scene.toml".as_ref()).unwrap()).unwrap()
+}
+
+struct Set {
+    scene: &'static Scene,
+    rays: Box<dyn RayQuery>,
+    lights: Lights,
+    table: AreaTable,
+    model: Model,
+}
+
+impl Set {
+    fn new(scene: Scene, name: ModelName) -> Self {
+        let scene: &'static Scene = Box::leak(Box::new(scene));
+        let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
+        let rays = query::build(Backend::preferred(), &meshes).unwrap();
+        let (lights, table) = (Lights::new(scene), AreaTable::new(&scene.objects[0].mesh).unwrap());
+        Self { rays, lights, table, model: Model::new(name, &MEDIUM, true), scene }
+    }
+
+    fn filler<'a>(&'a self, stream: &'a CacheStream, density: &'a Density, cosine_share: f32) -> Filler<'a> {
+        Filler {
+            scene: self.scene,
+            rays: &*self.rays,
+            lights: &self.lights,
+            object: 0,
+            table: &self.table,
+            model: &self.model,
+            eta: MEDIUM.eta,
+            sampling: EntrySampling::Light,
+            cosine_share,
+            stream,
+            density,
+        }
+    }
+}
+
+/// Mean and standard error of the flux of each of some independent caches.
+fn flux(set: &Set, density: &Density, cosine_share: f32) -> [f64; 2] {
+    let caches = 40;
+    let each: Vec<f64> = (0..caches)
+        .map(|seed| {
+            let stream = CacheStream::new(Points::Independent, seed, 0);
+            let cache = set.filler(&stream, density, cosine_share).fill(0, 2000, &mut RayTally::default());
+            cache.lit.iter().map(|s| f64::from(s.flux.mean())).sum::<f64>() / 2000.0
+        })
+        .collect();
+    let n = caches as f64;
+    let mean = each.iter().sum::<f64>() / n;
+    let variance = each.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    [mean, (variance / n).sqrt()]
+}
+
+fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).abs() / a[1].hypot(b[1])
+}
+
+#[test]
+fn directions_by_light_and_by_cosine_bring_the_same_flux_together_and_alone() {
+    for (height, environment) in [(5.2, ""), (9.0, ""), (9.0, "[environment]\nradiance = 0.3\n")] {
+        let set = Set::new(scene(height, environment), ModelName::Standard);
+        let even = Density::even();
+        let shares: &[f32] = if environment.is_empty() { &[0.0, 0.2, 0.5] } else { &[0.3, 0.5, 0.7] };
+        let found: Vec<[f64; 2]> = shares.iter().map(|&share| flux(&set, &even, share)).collect();
+        for other in &found[1..] {
+            assert!(apart(found[0], *other) < 6.0, "{height} {environment}: {found:?}");
+        }
+        assert!(apart(found[2], [1.15 * found[1][0], found[1][1]]) > 6.0, "15 % would not be noticed: {found:?}");
+    }
+}
+
+#[test]
+fn a_lamp_nearer_than_it_is_wide_takes_some_directions_by_the_cosine_and_has_less_noise_by_it() {
+    let near = Set::new(scene(5.2, ""), ModelName::Standard);
+    let share = near.lights.cosine_share(near.scene.objects[0].mesh.bounds().unwrap());
+    assert!(share > 0.2 && share <= 0.5, "{share}");
+    let even = Density::even();
+    let noise = [0.0, share].map(|share| flux(&near, &even, share)[1]);
+    assert!(noise[1] < noise[0], "{noise:?}");
+    let far = Set::new(scene(30.0, ""), ModelName::Standard);
+    assert!(far.lights.cosine_share(far.scene.objects[0].mesh.bounds().unwrap()) == 0.0);
+}
+
+#[test]
+fn samples_spread_by_what_is_seen_bring_the_same_flux_as_an_even_spread() {
+    let set = Set::new(scene(9.0, ""), ModelName::Standard);
+    let envelope = Envelope::new(&set.model, &MEDIUM);
+    let (even, stream) = (Density::even(), CacheStream::new(Points::Sobol, 99, 0));
+    let points = seen(set.scene, &*set.rays);
+    assert!(points[0].len() > 100 && points[1].len() < points[0].len());
+    let survey = Survey::new(&set.filler(&stream, &even, 0.0), &envelope, &points[0], Spread::Seen);
+    assert!(survey.variance > 0.0 && survey.typical.x > 0.0);
+    assert!(survey.noise2(1e4) > survey.noise2(1e5));
+    let found = [flux(&set, &even, 0.0), flux(&set, &survey.density, 0.0)];
+    assert!(apart(found[0], found[1]) < 6.0, "{found:?}");
+    assert!(found[0][1] != found[1][1], "the densities are the same");
+}
+
+/// Σ S_d near flux over samples of a cache.
+struct Near<'a>(&'a NearField, &'a Model, &'a [CachedSample], &'a Exit);
+
+impl ModelVisitor for Near<'_> {
+    type Out = f64;
+    fn visit<B: Bssrdf>(self, model: &B) -> f64 {
+        let Self(near, of, samples, exit) = self;
+        let each = samples.iter().map(|s| {
+            let share = near.partition.near(of.apart2(&s.entry, s.depth, exit));
+            f64::from((model.eval_cached(&s.entry, s.depth, exit, 0.0) * s.flux * share).mean())
+        });
+        each.sum()
+    }
+}
+
+/// On a ball smaller than the near field its lines meet two and more sheets at all angles.
+#[test]
+fn the_near_field_is_the_part_that_the_cache_leaves_out() {
+    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
+        let set = Set::new(scene(9.0, ""), name);
+        let envelope = Envelope::new(&set.model, &MEDIUM);
+        let even = Density::even();
+        let stream = CacheStream::new(Points::Independent, 1, 0);
+        let filler = set.filler(&stream, &even, 0.0);
+        for (radius, direction) in [(2.0, Vec3::new(0.6, 0.8, 0.0)), (8.0, Vec3::new(0.9, 0.3, 0.3)), (20.0, Vec3::X)] {
+            let near = NearField::new(&envelope, radius);
+            let from = direction.normalize();
+            let hit = set.rays.closest(&query::Ray::new(9.0 * from, -from)).unwrap();
+            let at = set.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
+            let exit = Exit { x: at.x, n: at.n_geometric, w: at.n_geometric };
+            let own = statistics((0..4000).map(|i| {
+                f64::from(
+                    near.estimate(&filler, &exit, hash(i + 1), (&mut RayTally::default(), &mut GatherTally::default()))
+                        .mean(),
+                )
+            }));
+            let cached = statistics((0..300).map(|i| {
+                let cache = filler.fill(i * 2000, 2000, &mut RayTally::default());
+                set.model.visit(Near(&near, &set.model, &cache.lit, &exit)) / 2000.0
+            }));
+            assert!(apart(own, cached) < 6.0, "{} {radius}: {own:?} {cached:?}", name.name());
+            assert!(own[1] < 0.03 * own[0] && cached[1] < 0.06 * cached[0], "{own:?} {cached:?}");
+        }
+    }
+}
+
+fn statistics(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let values: Vec<f64> = values.collect();
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    [mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt()]
+}

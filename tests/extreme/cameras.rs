@@ -1,0 +1,80 @@
+//! Cameras and pictures at the ends of what there is.
+
+use super::harness::{BASE, load, ok, refused, shots, with};
+
+fn camera(from: &str, to: &str) -> marmor::Result<marmor::scene::Scene> {
+    load(&with(&[(from, to)]))
+}
+
+#[test]
+fn a_camera_inside_a_body_ok() {
+    ok(&camera("position = [0, 1, 6]\nlook_at = [0, 0, 0]", "position = [0, 0, 0]\nlook_at = [0, 0, 1]").unwrap());
+}
+
+#[test]
+fn a_camera_on_a_surface_ok() {
+    ok(&camera("position = [0, 1, 6]", "position = [0, 0, 1]").unwrap());
+    ok(&camera("position = [0, 1, 6]\nlook_at = [0, 0, 0]", "position = [0, -1.5, 0]\nlook_at = [1, -1.5, 0]")
+        .unwrap());
+}
+
+#[test]
+fn a_view_parallel_to_up_refused() {
+    refused(camera("position = [0, 1, 6]", "position = [0, 5, 0]"), &["parallel to up", "set `up`"]);
+}
+
+#[test]
+fn a_view_nearly_parallel_to_up_ok() {
+    ok(&camera("position = [0, 1, 6]", "position = [0, 6, 0.0001]").unwrap());
+}
+
+#[test]
+fn a_camera_at_what_it_looks_at_refused() {
+    refused(camera("position = [0, 1, 6]", "position = [0, 0, 0]"), &["the same point"]);
+}
+
+#[test]
+fn a_view_of_179_9_degrees_ok() {
+    ok(&camera("fov = 30", "fov = 179.9").unwrap());
+}
+
+#[test]
+fn a_view_of_a_millionth_degree_ok() {
+    ok(&camera("fov = 30", "fov = 1e-6").unwrap());
+}
+
+#[test]
+fn a_view_of_180_degrees_refused() {
+    refused(camera("fov = 30", "fov = 180"), &["`camera.fov` is 180"]);
+}
+
+#[test]
+fn a_picture_of_one_pixel_ok() {
+    ok(&camera("resolution = [8, 6]", "resolution = [1, 1]").unwrap());
+}
+
+#[test]
+fn a_picture_of_one_row_ok() {
+    ok(&camera("resolution = [8, 6]", "resolution = [500, 1]").unwrap());
+}
+
+#[test]
+fn a_picture_without_pixels_refused() {
+    refused(camera("resolution = [8, 6]", "resolution = [0, 6]"), &["1 to 65536"]);
+}
+
+#[test]
+fn a_scene_without_objects_refused() {
+    let text = BASE.split("[[object]]").next().unwrap().to_string() + "[environment]\nradiance = 1\n";
+    refused(load(&text), &["object", "at least one [[object]]"]);
+}
+
+#[test]
+fn a_camera_that_sees_nothing_ok() {
+    let scene = camera("look_at = [0, 0, 0]", "look_at = [0, 1, 12]").unwrap();
+    for shot in shots(&scene) {
+        shot.assert_sound();
+        let first = shot.image.pixels[0];
+        assert!(shot.image.pixels.iter().all(|&p| p == first), "{}: the environment alone", shot.what);
+    }
+}

@@ -1,0 +1,350 @@
+//! Five laws over several scenes, every method and model, on every backend of the build. 1: scale. 2: place. 3: energy.
+//! 4: order (files and signals: tests/interrupted.rs). 5: honesty (see also tests/extreme/).
+#![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
+
+use marmor::bssrdf::{Bssrdf, ModelName, ModelVisitor};
+use marmor::film::{Counts, Film, Image, Window};
+use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View};
+use marmor::math::Rgb;
+use marmor::optics::{reflectance, transmittance};
+use marmor::query::{self, Backend};
+use marmor::render::{self, Job};
+use marmor::sampling::Points;
+use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread, Surface};
+use std::fmt::Write as _;
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+
+/// A scene by numbers: lengths times `scale`, coefficients over it, places plus `shift`.
+struct Built {
+    scale: f64,
+    shift: [f64; 3],
+    text: String,
+    obj: String,
+}
+
+impl Built {
+    fn new(scale: f64, shift: [f64; 3]) -> Self {
+        Self { scale, shift, text: "unit = \"mm\"\n".into(), obj: String::new() }
+    }
+
+    fn length(&self, v: f64) -> String {
+        format!("{:e}", v * self.scale)
+    }
+
+    fn vector(&self, v: [f64; 3]) -> String {
+        format!("[{}]", v.map(|x| self.length(x)).join(", "))
+    }
+
+    fn point(&self, v: [f64; 3]) -> String {
+        let at: [String; 3] = std::array::from_fn(|i| format!("{:e}", v[i] * self.scale + self.shift[i]));
+        format!("[{}]", at.join(", "))
+    }
+
+    fn coefficient(&self, v: [f64; 3]) -> String {
+        format!("[{}]", v.map(|x| format!("{:e}", x / self.scale)).join(", "))
+    }
+
+    fn camera(&mut self, position: [f64; 3], look_at: [f64; 3], fov: f64) {
+        let (p, l) = (self.point(position), self.point(look_at));
+        let _ = write!(self.text, "[camera]\nposition = {p}\nlook_at = {l}\nfov = {fov}\nresolution = [12, 9]\n");
+    }
+
+    fn rectangle(&mut self, name: &str, centre: [f64; 3], u: [f64; 3], v: [f64; 3], material: &str) {
+        let (c, u, v) = (self.point(centre), self.vector(u), self.vector(v));
+        let _ = write!(
+            self.text,
+            "[[object]]\nname = \"{name}\"\nshape = \"rectangle\"\ncentre = {c}\nedge_u = {u}\nedge_v = {v}\nmaterial = \"{material}\"\n"
+        );
+    }
+
+    fn wax(&mut self, name: &str, s: [f64; 3], a: [f64; 3], more: &str) {
+        let (s, a) = (self.coefficient(s), self.coefficient(a));
+        let _ = write!(
+            self.text,
+            "[material.{name}]\ntype = \"translucent\"\nsigma_s_prime = {s}\nsigma_a = {a}\neta = 1.3\n{more}\n"
+        );
+    }
+
+    fn load(&self) -> Scene {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("mesh.obj"), &self.obj).unwrap();
+        let scene = Scene::load(&SceneFile::parse(&self.text, &folder.path().join("s.toml")).unwrap());
+        scene.unwrap_or_else(|e| panic!("{e}\n{}", self.text))
+    }
+}
+
+/// Half of a twisted bar of sound triangles, its coordinates in sixteenths: sums with powers of two are exact.
+fn bar(built: &mut Built) {
+    let ring = |i: i32| {
+        let twist = [[4, 0], [3, 3], [0, 4], [-3, 3], [-4, 0], [-3, -3], [0, -4], [3, -3]];
+        (0..4).map(move |k| {
+            let [x, z] = twist[((2 * k + i) % 8) as usize];
+            [f64::from(x) / 8.0, f64::from(i) / 4.0 - 1.0, f64::from(z) / 8.0]
+        })
+    };
+    let (shift, scale) = (built.shift, built.scale);
+    for [x, y, z] in (0..8).flat_map(ring) {
+        let at = |v: f64, i: usize| format!("{:e}", v * scale + shift[i]);
+        let _ = writeln!(built.obj, "v {} {} {}", at(x, 0), at(y, 1), at(z, 2));
+    }
+    for i in 0..7 {
+        for k in 0..4 {
+            let (a, b) = (4 * i + k + 1, 4 * i + (k + 1) % 4 + 1);
+            let _ = writeln!(built.obj, "f {} {} {}\nf {} {} {}", a, a + 4, b, b, a + 4, b + 4);
+        }
+    }
+    let _ = write!(built.obj, "f 1 2 3 4\nf 29 32 31 30\n");
+    built.text += "[[object]]\nname = \"bar\"\nmesh = \"mesh.obj\"\nnormals = \"smooth\"\nmaterial = \"wax\"\n";
+}
+
+/// Three scenes: a bar under a lamp on a floor; a slab in an environment; two bodies with a lamp between them.
+fn scenes(scale: f64, shift: [f64; 3]) -> Vec<(&'static str, Scene)> {
+    let new = || Built::new(scale, shift);
+    let lamp = "[material.lamp]\ntype = \"emissive\"\nradiance = [3, 2, 1]\n";
+    let grey = "[material.grey]\ntype = \"diffuse\"\nalbedo = 0.5\n";
+    let mut all = Vec::new();
+
+    let mut s = new();
+    s.camera([1.0, 2.0, 5.0], [0.0, 0.0, 0.0], 35.0);
+    bar(&mut s);
+    s.rectangle("floor", [0.0, -1.0, 0.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0], "grey");
+    s.rectangle("lamp", [1.0, 3.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.5], "lamp");
+    s.wax("wax", [2.0, 3.0, 4.0], [0.05, 0.1, 0.2], "");
+    s.text += lamp;
+    s.text += grey;
+    all.push(("bar", s.load()));
+
+    let mut s = new();
+    s.camera([0.0, 0.5, 2.0], [0.0, 0.0, 0.0], 60.0);
+    s.rectangle("slab", [0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0], "wax");
+    s.wax("wax", [1.0, 1.0, 1.0], [0.01, 0.01, 0.01], "");
+    s.text += "[environment]\nradiance = [1, 0.5, 0.25]\n";
+    all.push(("slab", s.load()));
+
+    let mut s = new();
+    s.camera([0.0, 1.0, 4.0], [0.0, 0.0, 0.0], 50.0);
+    s.rectangle("left", [-1.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5], "wax");
+    s.rectangle("right", [1.0, 0.0, 0.0], [0.0, 0.0, 0.5], [0.0, 0.5, 0.0], "milk");
+    s.rectangle("lamp", [0.0, 0.0, 0.0], [0.0, 0.25, 0.0], [0.25, 0.0, 0.0], "lamp");
+    s.wax("wax", [40.0, 30.0, 20.0], [0.5, 0.1, 3.0], "");
+    s.wax("milk", [0.5, 0.25, 1.0], [0.001, 0.0, 0.002], "g = 0.9");
+    s.text += "[environment]\nradiance = 0.25\n[material.lamp]\ntype = \"emissive\"\nradiance = [3, 2, 1]\ntwo_sided = true\n";
+    all.push(("two bodies", s.load()));
+    all
+}
+
+fn options(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
+    SubsurfaceOptions {
+        cache_samples,
+        estimator,
+        cut_error: Some(0.1),
+        entry: EntrySampling::Light,
+        points: Points::Sobol,
+        spread: Spread::Seen,
+        specular: true,
+        light_samples: 1,
+        seed: 3,
+    }
+}
+
+fn backends() -> impl Iterator<Item = Backend> {
+    Backend::ALL.into_iter().filter(|b| b.is_built_in())
+}
+
+fn film<I: Integrator>(method: &I, scene: &Scene, backend: Backend, passes: Range<u32>) -> (Film, Tally) {
+    let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
+    let rays = query::build(backend, &meshes).unwrap();
+    let resolution = scene.camera.resolution;
+    let mut film = Film::new(resolution, Window::full(resolution)).unwrap().starting_at(passes.start);
+    let cancel = AtomicBool::new(false);
+    let job = Job { seed: 3, passes: Some(passes.end), time: None, cancel: &cancel };
+    let outcome = render::run(method, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    (film, outcome.tally)
+}
+
+fn set_model(scene: &mut Scene, model: ModelName) {
+    for material in &mut scene.materials {
+        if let Surface::Translucent(t) = &mut material.surface {
+            t.model = model;
+            // Some four mean free paths of the thinnest channel: a slab that every medium here allows.
+            let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
+            t.thickness = (model == ModelName::Slab).then_some(4.0 * longest);
+        }
+    }
+}
+
+/// The film of every method, model and estimator by name.
+fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -> Vec<(String, Film)> {
+    let mut all = Vec::new();
+    set_model(scene, ModelName::Standard);
+    for (name, radius) in [("ambient_occlusion", f32::INFINITY), ("ambient_occlusion, radius", radius as f32)] {
+        let method = AmbientOcclusion { radius, rays: 2 };
+        all.push((name.to_string(), film(&method, scene, backend, passes.clone()).0));
+    }
+    all.push(("direct".into(), film(&Direct::new(scene, 2).unwrap(), scene, backend, passes.clone()).0));
+    for model in ModelName::ALL {
+        set_model(scene, model);
+        for (estimator, samples) in [
+            (Estimator::Cut, 1500),
+            (Estimator::All, 100),
+            (Estimator::Notes, 100),
+            (Estimator::Thinned, 1500),
+            (Estimator::Cluster, 1500),
+        ] {
+            let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
+            let name = format!("{}, {}", model.name(), estimator.name());
+            all.push((name, film(&method, scene, backend, passes.clone()).0));
+        }
+    }
+    all
+}
+
+fn bits(image: &Image) -> Vec<[u32; 3]> {
+    image.pixels.iter().map(|p| p.0.map(f32::to_bits)).collect()
+}
+
+fn assert_same(what: &str, a: &[(String, Film)], b: &[(String, Film)]) {
+    assert_eq!(a.len(), b.len());
+    for ((name, a), (_, b)) in a.iter().zip(b) {
+        let (a, b) = (a.image(), b.image());
+        let different = bits(&a).iter().zip(&bits(&b)).filter(|(a, b)| a != b).count();
+        let first = a.pixels.iter().zip(&b.pixels).find(|(a, b)| a != b);
+        assert_eq!(
+            different,
+            0,
+            "{what}: {name}: {different} of {} pixels differ, the first {first:?}",
+            a.pixels.len()
+        );
+    }
+}
+
+#[test]
+fn law_1_scale_powers_of_two_change_no_bit() {
+    for backend in backends() {
+        let plain = scenes(1.0, [0.0; 3]);
+        let plain: Vec<_> = plain.into_iter().map(|(name, mut s)| (name, films(&mut s, backend, 0..1, 0.5))).collect();
+        for exponent in [-20, 1, 20] {
+            let k = 2_f64.powi(exponent);
+            for ((name, mut scene), (_, expected)) in scenes(k, [0.0; 3]).into_iter().zip(&plain) {
+                let found = films(&mut scene, backend, 0..1, 0.5 * k);
+                assert_same(&format!("{} on {}, scale 2^{exponent}", name, backend.name()), &found, expected);
+            }
+        }
+    }
+}
+
+/// Coordinates of the scenes are sixteenths; a million and those have room in f64, so that nothing is rounded.
+#[test]
+fn law_2_place_a_million_units_away_is_the_same_place() {
+    for backend in backends() {
+        for shift in [[1e6, 0.0, 0.0], [-1e6, 1e6, 3e6]] {
+            for ((name, mut here), (_, mut there)) in scenes(1.0, [0.0; 3]).into_iter().zip(scenes(1.0, shift)) {
+                let (here, there) = (films(&mut here, backend, 0..1, 0.5), films(&mut there, backend, 0..1, 0.5));
+                assert_same(&format!("{name} on {}, moved by {shift:?}", backend.name()), &there, &here);
+            }
+        }
+    }
+}
+
+/// A wide plane of each model in a white furnace: what enters comes back times the model's total, and the mirror adds the
+/// rest; white and convex surfaces vanish.
+#[test]
+fn law_3_energy_furnaces_are_one() {
+    struct Total;
+    impl ModelVisitor for Total {
+        type Out = (Rgb, bool);
+        fn visit<B: Bssrdf>(self, model: &B) -> (Rgb, bool) {
+            (model.total(), model.claims().bounded_energy)
+        }
+    }
+    let (t21, mirror) = (f64::from(transmittance(1.3, 1.0)), f64::from(reflectance(1.3, 1.0)));
+    for backend in backends() {
+        for model in [ModelName::Standard, ModelName::Better, ModelName::Normalised] {
+            let mut s = Built::new(1.0, [0.0; 3]);
+            s.camera([0.0, 0.0, 0.5], [0.0, 0.0, 0.0], 0.2);
+            s.rectangle("plane", [0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], "wax");
+            s.wax("wax", [4.0, 3.0, 2.0], [0.75, 1.0, 1.25], &format!("model = \"{}\"", model.name()));
+            s.text += "[environment]\nradiance = 1\n";
+            let scene = s.load();
+            let Surface::Translucent(t) = &scene.materials[0].surface else { panic!("not wax") };
+            let (total, bounded) = t.build().unwrap().visit(Total);
+            assert!(bounded && total.max() <= 1.0 && total.min() > 0.0, "{}: {total:?}", model.name());
+            let runs: Vec<Image> = (1..=10)
+                .map(|seed| {
+                    let method = Subsurface::new(&scene, SubsurfaceOptions { seed, ..options(Estimator::Cut, 4096) });
+                    film(&method.unwrap(), &scene, backend, 0..24).0.image()
+                })
+                .collect();
+            for c in 0..3 {
+                let means: Vec<f64> = runs
+                    .iter()
+                    .map(|image| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / image.pixels.len() as f64)
+                    .collect();
+                let n = means.len() as f64;
+                let mean = means.iter().sum::<f64>() / n;
+                let error = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+                let expected = t21 * f64::from(total[c]) + mirror;
+                let what = format!("{} on {}, channel {c}", model.name(), backend.name());
+                assert!(error < 0.02 * expected, "{what}: too noisy to say anything: {mean} +- {error}");
+                assert!((mean - expected).abs() < 8.0 * error + 1e-4, "{what}: {mean} +- {error}, expected {expected}");
+                assert!(mean < 1.0 + 8.0 * error, "{what}: more than all: {mean}");
+            }
+        }
+        let mut s = Built::new(1.0, [0.0; 3]);
+        s.camera([0.0, 0.0, 3.0], [0.0, 0.0, 0.0], 60.0);
+        s.text += "[environment]\nradiance = 1\n[[object]]\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nmaterial = \"white\"\n[material.white]\ntype = \"diffuse\"\nalbedo = 1\n";
+        let scene = s.load();
+        for pixel in film(&Direct::new(&scene, 1).unwrap(), &scene, backend, 0..4).0.image().pixels {
+            assert!((pixel[0] - 1.0).abs() < 1e-5, "direct on {}: {pixel:?}", backend.name());
+        }
+        let image = film(&AmbientOcclusion { radius: f32::INFINITY, rays: 4 }, &scene, backend, 0..4).0.image();
+        assert!(image.pixels.iter().all(|&p| p == Rgb::WHITE), "a convex body occludes nothing of itself");
+    }
+}
+
+#[test]
+fn law_4_order_threads_and_splits_change_no_bit() {
+    let pool = |threads: usize| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    for backend in backends() {
+        for (name, mut scene) in scenes(1.0, [0.0; 3]) {
+            let whole = pool(1).install(|| films(&mut scene, backend, 0..5, 0.5));
+            let first = pool(3).install(|| films(&mut scene, backend, 0..1, 0.5));
+            let last = pool(2).install(|| films(&mut scene, backend, 2..5, 0.5));
+            let middle = pool(5).install(|| films(&mut scene, backend, 1..2, 0.5));
+            for (((whole, first), last), middle) in whole.iter().zip(&first).zip(&last).zip(&middle) {
+                let mut joined = last.1.clone();
+                joined.join(&first.1).unwrap();
+                joined.join(&middle.1).unwrap();
+                assert!(
+                    joined == whole.1,
+                    "{name} on {}: {} of parts is not that of all passes",
+                    backend.name(),
+                    whole.0
+                );
+            }
+        }
+    }
+}
+
+/// Every sample of every pixel is in the picture or in a count.
+#[test]
+fn law_5_honesty_every_sample_is_kept_or_counted() {
+    for backend in backends() {
+        for (name, mut scene) in scenes(1.0, [0.0; 3]) {
+            // Enough light for some products to leave single precision, and some not.
+            for material in &mut scene.materials {
+                if let Surface::Emissive { radiance, .. } = &mut material.surface {
+                    *radiance = Rgb::splat(2e38);
+                }
+            }
+            for (method, film) in films(&mut scene, backend, 0..2, 0.5) {
+                let Counts { samples, non_finite, first_non_finite, .. } = film.counts();
+                let what = format!("{name} on {}: {method}", backend.name());
+                assert_eq!(samples + non_finite, 2 * 12 * 9, "{what}");
+                assert_eq!(first_non_finite.is_some(), non_finite > 0, "{what}");
+                assert!(film.image().pixels.iter().all(|p| p.is_finite() && p.min() >= 0.0), "{what}");
+            }
+        }
+    }
+}
