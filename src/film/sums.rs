@@ -198,6 +198,11 @@ pub struct Film {
     counts: Counts,
 }
 
+/// A list of one run of passes.
+fn one_range(range: Range<u32>) -> Vec<Range<u32>> {
+    std::iter::once(range).collect()
+}
+
 impl Film {
     /// Bytes for each pixel of the window.
     pub const BYTES_PER_PIXEL: usize = size_of::<Sums>();
@@ -222,7 +227,7 @@ impl Film {
             Error::new(ErrorKind::Memory, format!("{what}, which the system refuses; {}", Self::REMEDY))
         })?;
         sums.resize(window.area(), Sums::default());
-        Ok(Self { resolution, window, sums, ranges: vec![0..0], counts: Counts::default() })
+        Ok(Self { resolution, window, sums, ranges: one_range(0..0), counts: Counts::default() })
     }
 
     const REMEDY: &str = "render a smaller picture, or parts of it by --crop";
@@ -241,7 +246,7 @@ impl Film {
     #[must_use]
     pub fn starting_at(mut self, pass: u32) -> Self {
         debug_assert_eq!(self.passes(), 0, "the film has passes already");
-        self.ranges = vec![pass..pass];
+        self.ranges = one_range(pass..pass);
         self
     }
 
