@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::{Film, Window};
 use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
-use crate::sampling::PixelStream;
+use crate::sampling::{Pairs, PixelStream};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -161,13 +161,20 @@ fn render_tile<I: Integrator>(
     let camera = &view.scene.camera;
     let width = u64::from(camera.resolution[0]);
     let pixels = pixels(tile);
-    let rays: Vec<CameraRay> = pixels
+    let mut places = Pairs::with_capacity(pixels.len());
+    let streams: Vec<PixelStream> = pixels
         .iter()
         .map(|&[x, y]| {
             let mut stream = PixelStream::new(job.seed, u64::from(y) * width + u64::from(x), pass);
-            let ray = camera.ray([x, y], stream.next_2d());
-            CameraRay { ray, stream }
+            places.push(&mut stream);
+            stream
         })
+        .collect();
+    let rays: Vec<CameraRay> = pixels
+        .iter()
+        .zip(places.numbers())
+        .zip(streams)
+        .map(|((&pixel, place), stream)| CameraRay { ray: camera.ray(pixel, place), stream })
         .collect();
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);
