@@ -193,12 +193,17 @@ fn check_says_what_is_built_and_what_is_left_out() {
 #[test]
 fn a_model_without_the_first_order_is_told() {
     let folder = folder();
-    let told = |model: &str| text(&marmor(folder.path(), &["check", "scene.toml", "--model", model]).stdout);
+    let told = |model: &str, single: &str| {
+        text(&marmor(folder.path(), &["check", "scene.toml", "--model", model, "-D", single]).stdout)
+    };
     for model in ["better", "beam"] {
-        assert!(told(model).contains("leaves out light scattered once"), "{model}");
+        assert!(told(model, "method.single=false").contains("leaves out light scattered once"), "{model}");
+        let added = told(model, "method.single=true");
+        assert!(added.contains("single scattering: exact") && !added.contains("leaves out"), "{model}: {added}");
     }
     for model in ["standard", "directional"] {
-        assert!(!told(model).contains("scattered once"), "{model}");
+        assert!(!told(model, "method.single=false").contains("scattered once"), "{model}");
+        assert!(told(model, "method.single=true").contains("single scattering: the models have it"), "{model}");
     }
 }
 

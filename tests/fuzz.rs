@@ -255,6 +255,7 @@ fn scene() {
         // Tables of both methods with light, as a render would make them.
         let _ = Direct::new(&scene, 1);
         let options = SubsurfaceOptions {
+            single: false,
             cache_samples: 100,
             estimator: Estimator::Cut,
             cut_error: Some(0.1),

@@ -136,6 +136,7 @@ fn scenes(scale: f64, shift: [f64; 3]) -> Vec<(&'static str, Scene)> {
 
 fn options(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
     SubsurfaceOptions {
+        single: false,
         cache_samples,
         estimator,
         cut_error: Some(0.1),

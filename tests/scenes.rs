@@ -190,6 +190,7 @@ const WAX: &str = "[material.wax]\ntype = \"translucent\"\nsigma_s_prime = [2, 3
 
 fn subsurface(seed: u64) -> SubsurfaceOptions {
     SubsurfaceOptions {
+        single: false,
         cache_samples: 4096,
         estimator: Estimator::Notes,
         cut_error: Some(0.03),

@@ -94,6 +94,7 @@ fn render<I: Integrator>(integrator: &I, scene: &Scene, passes: u32, seed: u64, 
 
 fn subsurface(scene: &Scene, estimator: Estimator, cache_samples: u32, points: Points, seed: u64) -> Subsurface {
     let options = SubsurfaceOptions {
+        single: false,
         cache_samples,
         estimator,
         cut_error: None,

@@ -172,6 +172,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
             Method::Direct(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
             Method::Subsurface(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
+            Method::VolumePath(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
         };
         if film.passes() == 0 {
             return Err(Error::usage("0 samples per pixel make no picture; ask for at least 1 with --spp"));
@@ -296,6 +297,13 @@ impl Task<'_> {
                 "warning: none of {} samples on translucent surfaces met any light: do the lights face them? (a light \
                  shines along its outward normal; `two_sided = true` lets it shine both ways)",
                 outcome.tally.gather.samples
+            );
+        }
+        let (lost, walks) = (outcome.tally.walk.lost, outcome.tally.walk.walks);
+        if lost > 0 {
+            eprintln!(
+                "{lost} of {walks} paths inside bodies were lost: they met a hole of a mesh, the wrong side of a face or another \
+                 medium, or rounding put them there; they carry nothing"
             );
         }
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();

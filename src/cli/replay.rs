@@ -19,6 +19,7 @@ pub fn run(prepared: &Prepared, view: View<'_>, job: &Job<'_>, pixel: [u32; 2], 
         Method::AmbientOcclusion(method) => render::replay(method, view, job, pixel, pass),
         Method::Direct(method) => render::replay(method, view, job, pixel, pass),
         Method::Subsurface(method) => render::replay(&**method, view, job, pixel, pass),
+        Method::VolumePath(method) => render::replay(&**method, view, job, pixel, pass),
     };
     let number = u64::from(y) * u64::from(width) + u64::from(x);
     let ray = view.scene.camera.ray(pixel, PixelStream::new(job.seed, number, pass).next_2d());

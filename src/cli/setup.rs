@@ -1,17 +1,21 @@
 //! From a scene file and the options over it to a checked scene and a method: shared by `render` and `check`.
 
 use marmor::bssrdf::ModelName;
-use marmor::integrator::{AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions};
+use marmor::integrator::{
+    AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions,
+};
 use marmor::query::Backend;
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, MethodName, MethodOptions, Scene, SceneFile, Spread, Surface};
+use marmor::scene::{
+    DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, Surface,
+};
 use marmor::{Error, Result};
 use std::path::Path;
 
 /// Options that decide what is computed.
 #[derive(clap::Args)]
 pub struct MethodArgs {
-    /// ambient_occlusion, direct or subsurface [default: the scene's, else subsurface if anything is translucent]
+    /// ambient_occlusion, direct, subsurface or volume_path [default: the scene's, else subsurface if anything is translucent]
     #[arg(long, value_name = "NAME")]
     method: Option<MethodName>,
     /// BSSRDF model of all translucent materials [default: each material's own]
@@ -43,6 +47,7 @@ pub enum Method {
     AmbientOcclusion(AmbientOcclusion),
     Direct(Direct),
     Subsurface(Box<Subsurface>),
+    VolumePath(Box<VolumePath>),
 }
 
 impl Method {
@@ -52,6 +57,7 @@ impl Method {
             Self::AmbientOcclusion(_) => MethodName::AmbientOcclusion.name(),
             Self::Direct(_) => MethodName::Direct.name(),
             Self::Subsurface(_) => MethodName::Subsurface.name(),
+            Self::VolumePath(_) => MethodName::VolumePath.name(),
         }
     }
 
@@ -62,6 +68,7 @@ impl Method {
             Self::AmbientOcclusion(m) => m.parts(scene),
             Self::Direct(m) => m.parts(scene),
             Self::Subsurface(m) => m.parts(scene),
+            Self::VolumePath(m) => m.parts(scene),
         }
     }
 }
@@ -186,10 +193,20 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
                 points,
                 spread: if as_notes { Spread::Area } else { options.spread.unwrap_or(Spread::Seen) },
                 specular: options.specular.unwrap_or(true),
+                single: options.single.unwrap_or(true),
                 light_samples,
                 seed,
             };
             Method::Subsurface(Box::new(Subsurface::new(scene, options)?))
+        }
+        MethodName::VolumePath => {
+            let options = VolumePathOptions {
+                orders: options.orders.unwrap_or(Orders::All),
+                photons: options.photons.unwrap_or(DEFAULT_PHOTONS),
+                specular: options.specular.unwrap_or(true),
+                seed,
+            };
+            Method::VolumePath(Box::new(VolumePath::new(scene, options)?))
         }
     })
 }

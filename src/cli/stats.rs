@@ -42,6 +42,7 @@ pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
         "seconds": { "setup": seconds_setup, "cache": seconds.cache, "gather": seconds.gather },
         "rays": tally.rays,
         "gather": tally.gather,
+        "walk": tally.walk,
         "per_exit": {
             "nodes": tally.gather.nodes as f64 / exits,
             "pairs": tally.gather.pairs as f64 / exits,

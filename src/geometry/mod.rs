@@ -2,6 +2,7 @@
 //! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area.
 
 mod area_table;
+mod clearance;
 mod doctor;
 mod mesh;
 mod morton;
@@ -11,6 +12,7 @@ mod obj_mesh;
 mod shapes;
 
 pub use area_table::{AreaSample, AreaTable};
+pub use clearance::Clearance;
 pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;

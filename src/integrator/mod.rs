@@ -4,7 +4,9 @@
 mod ambient_occlusion;
 mod direct;
 mod shade;
+mod single;
 mod subsurface;
+mod volume_path;
 
 use crate::cache::GatherTally;
 use crate::geometry::SurfacePoint;
@@ -15,6 +17,7 @@ use crate::scene::Scene;
 pub use ambient_occlusion::AmbientOcclusion;
 pub use direct::Direct;
 pub use subsurface::{Subsurface, SubsurfaceOptions};
+pub use volume_path::{Left, VolumePath, VolumePathOptions};
 
 /// The scene and the backend that was built for it.
 #[derive(Clone, Copy)]
@@ -59,12 +62,50 @@ pub struct Tally {
     pub rays: RayTally,
     /// Cached samples and pairs.
     pub gather: GatherTally,
+    /// Paths inside media.
+    pub walk: WalkTally,
+}
+
+/// What paths inside media cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct WalkTally {
+    /// Stays of a path in a body.
+    pub walks: u64,
+    /// Collisions.
+    pub collisions: u64,
+    /// Flights that needed no ray.
+    pub clear: u64,
+    /// Rays inside bodies.
+    pub rays: u64,
+    /// Photons traced from lamps.
+    pub photons: u64,
+    /// Their collisions that were kept.
+    pub vertices: u64,
+    /// Kept collisions looked at from camera paths.
+    pub connections: u64,
+    /// Paths that met a hole of a mesh, the wrong side of a face, or another medium inside a body: they carry nothing.
+    pub lost: u64,
+}
+
+impl std::ops::AddAssign for WalkTally {
+    fn add_assign(&mut self, other: Self) {
+        self.walks += other.walks;
+        self.collisions += other.collisions;
+        self.clear += other.clear;
+        self.rays += other.rays;
+        self.photons += other.photons;
+        self.vertices += other.vertices;
+        self.connections += other.connections;
+        self.lost += other.lost;
+    }
 }
 
 impl std::ops::AddAssign for Tally {
     fn add_assign(&mut self, other: Self) {
         self.rays += other.rays;
         self.gather += other.gather;
+        self.walk += other.walk;
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
+use super::single::Single;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model, Partition};
 use crate::cache::{
@@ -38,6 +39,8 @@ pub struct SubsurfaceOptions {
     pub spread: Spread,
     /// Whether smooth surfaces mirror lights and environment.
     pub specular: bool,
+    /// Whether light scattered once is added to models that leave it out.
+    pub single: bool,
     /// Samples of each kind of light per diffuse point.
     pub light_samples: u32,
     /// Seed of the render.
@@ -52,6 +55,8 @@ pub struct Subsurface {
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
     bodies: Vec<Option<Body>>,
+    /// Light scattered once, where a model leaves it out.
+    single: Option<Single>,
     /// What is known of each body with the first pass.
     plans: OnceLock<Vec<Plan>>,
 }
@@ -116,6 +121,7 @@ impl Subsurface {
             light: DirectLight { lights, samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
             bodies,
+            single: if options.single { Single::new(scene, options.seed)? } else { None },
             plans: OnceLock::new(),
         })
     }
@@ -157,7 +163,7 @@ impl Subsurface {
             };
             let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
             let filler = self.filler(view, object, body, &stream, &even);
-            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread);
+            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread, self.options.cache_samples);
             Plan { survey, near: self.near(body) }
         };
         self.bodies.iter().zip(points).enumerate().map(plan).collect()
@@ -222,6 +228,9 @@ impl Subsurface {
             }
             for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
                 inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));
+                if let (Some(single), Some(hit)) = (&self.single, &hits[i]) {
+                    inside[i] += single.radiance(view, &rays[i], hit, tally);
+                }
             }
         }
         inside
@@ -344,6 +353,13 @@ impl Integrator for Subsurface {
                 Part::built(format!("colour of `{name}`"), "S_d is evaluated in three channels")
             });
         }
+        parts.push(match (&self.single, self.options.single) {
+            (Some(_), _) => {
+                Part::built("single scattering", "exact, for the models that begin with light scattered twice")
+            }
+            (None, true) => Part::left_out("single scattering", "the models have it"),
+            (None, false) => Part::left_out("single scattering", "switched off"),
+        });
         parts.push(if self.options.specular {
             Part::built("specular reflection", "nearest-hit rays")
         } else {

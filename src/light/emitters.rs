@@ -66,6 +66,17 @@ impl Lights {
         self.environment
     }
 
+    /// Mean radiance of the area lights, by power and over the channels; 0 without any.
+    pub fn mean_radiance(&self) -> f32 {
+        let mut below = 0.0;
+        let weighted = self.emitters.iter().zip(&self.cumulative).map(|(emitter, &sum)| {
+            let chance = sum - below;
+            below = sum;
+            emitter.radiance.mean() * chance as f32
+        });
+        weighted.sum()
+    }
+
     /// Triangles in the light table.
     pub fn triangles(&self) -> usize {
         self.emitters.iter().map(|e| e.table.len()).sum()

@@ -248,6 +248,9 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         "entry",
         "spread",
         "specular",
+        "single",
+        "orders",
+        "photons",
     ];
     m.only("[method]", &keys)?;
     Ok(MethodOptions {
@@ -263,6 +266,11 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         entry: named_value(&m, "entry")?,
         spread: named_value(&m, "spread")?,
         specular: switch(&m, "specular")?,
+        single: switch(&m, "single")?,
+        orders: named_value(&m, "orders")?,
+        photons: m.get("photons", "a whole number from 0 to 16777216", |n| {
+            n.integer().filter(|i| (0..=1 << 24).contains(i)).map(|i| i as u32)
+        })?,
     })
 }
 

@@ -19,5 +19,7 @@ pub use doctor::Remark;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
-pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, RenderOptions, Spread};
+pub use options::{
+    DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread,
+};
 pub use world::{Material, Object, Scene, Surface, Translucent};

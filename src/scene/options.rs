@@ -47,7 +47,22 @@ named! {
     /// Light of area lights on diffuse surfaces.
     Direct = "direct",
     /// Light through translucent materials.
-    Subsurface = "subsurface"
+    Subsurface = "subsurface",
+    /// Paths traced through the media themselves.
+    VolumePath = "volume_path"
+}
+
+named! {
+    /// How often light may have been scattered in media.
+    Orders, "range of scattering orders",
+    /// Any number of times.
+    All = "all",
+    /// Never.
+    None = "0",
+    /// Once.
+    Single = "1",
+    /// Twice or more.
+    Multiple = "2+"
 }
 
 named! {
@@ -77,6 +92,9 @@ impl Estimator {
         }
     }
 }
+
+/// [`MethodOptions::photons`] unless the scene says.
+pub const DEFAULT_PHOTONS: u32 = 16384;
 
 named! {
     /// How the light arriving at a cached sample is found.
@@ -119,7 +137,13 @@ pub struct MethodOptions {
     pub entry: Option<EntrySampling>,
     /// Subsurface: how entry points are spread.
     pub spread: Option<Spread>,
-    /// Subsurface: add the mirror reflection at the boundary.
+    /// Subsurface: add light scattered once to models that leave it out.
+    pub single: Option<bool>,
+    /// Volume path: the scattering orders that are wanted.
+    pub orders: Option<Orders>,
+    /// Volume path: photons per pass and translucent object, 0 to 2^24.
+    pub photons: Option<u32>,
+    /// Subsurface and volume path: add the mirror reflection at the boundary.
     pub specular: Option<bool>,
 }
 

@@ -26,14 +26,13 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         if scene.objects.iter().all(|o| o.material != i) {
             said.push(format!("{head} is used by no object"));
         } else if let Surface::Translucent(t) = &scene.materials[i].surface {
-            said.extend(
-                outside_diffusion(t).into_iter().chain(no_first_order(t)).map(|what| format!("{head}: {what}")),
-            );
+            let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
+            said.extend(outside_diffusion(t).into_iter().chain(first).map(|what| format!("{head}: {what}")));
         }
     }
 }
 
-/// Models of orders 2 and higher want single scattering beside them, which no method renders yet.
+/// Models of orders 2 and higher want single scattering beside them.
 fn no_first_order(t: &Translucent) -> Option<String> {
     struct FirstOrder;
     impl ModelVisitor for FirstOrder {
@@ -45,9 +44,7 @@ fn no_first_order(t: &Translucent) -> Option<String> {
     let model = t.build().ok()?;
     (!model.visit(FirstOrder)).then(|| {
         let name = model.name().name();
-        format!(
-            "`{name}` leaves out light scattered once, which is not rendered yet: some 10 % of the light is missing"
-        )
+        format!("`{name}` leaves out light scattered once, and `single = false` too: some 10 % of the light is missing")
     })
 }
 

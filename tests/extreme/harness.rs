@@ -116,6 +116,7 @@ pub fn backends() -> impl Iterator<Item = Backend> {
 /// Options of the case's subsurface renders.
 pub fn subsurface(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
     SubsurfaceOptions {
+        single: false,
         cache_samples,
         estimator,
         cut_error: Some(0.1),

@@ -1,0 +1,172 @@
+//! How far away the nearest surface is at least, from a table: a step shorter than that needs no ray.
+
+use super::Mesh;
+use crate::math::Vec3;
+
+/// Lower bounds of the distance to a set of triangles, for the points of a box cut into cubes. One byte a cube.
+pub struct Clearance {
+    lo: Vec3,
+    hi: Vec3,
+    /// Edge of a cube [unit].
+    edge: f32,
+    size: [usize; 3],
+    /// Quarters of an edge, rounded down.
+    quarters: Vec<u8>,
+}
+
+/// Farther cubes count as this far [edges].
+const FARTHEST: f32 = 63.0;
+
+impl Clearance {
+    /// For the box `lo`..`hi` [unit], its longest side cut into `cells`, and all triangles of `meshes`.
+    pub fn new<'a>(meshes: impl IntoIterator<Item = &'a Mesh>, lo: Vec3, hi: Vec3, cells: u32) -> Self {
+        let side = (hi - lo).max_element();
+        // A little larger than the box, so that rounding puts no point of it outside.
+        let margin = Vec3::splat(1e-4 * side + f32::MIN_POSITIVE);
+        let (lo, hi) = (lo - margin, hi + margin);
+        let edge = (hi - lo).max_element() / cells as f32;
+        let size = ((hi - lo) / edge).to_array().map(|n| (n.ceil() as usize).clamp(1, cells as usize));
+        let mut table = Self { lo, hi, edge, size, quarters: Vec::new() };
+        let mut squares = vec![f32::INFINITY; size.iter().product()];
+        for mesh in meshes {
+            for triangle in 0..mesh.triangles.len() as u32 {
+                table.mark(mesh.corners(triangle), &mut squares);
+            }
+        }
+        for axis in 0..3 {
+            table.spread(axis, &mut squares);
+        }
+        table.quarters = squares.iter().map(|square| (4.0 * square.sqrt().min(FARTHEST)) as u8).collect();
+        table
+    }
+
+    /// Distance that every point within it of `x` is certain to be reached without meeting a triangle [unit]; negative
+    /// outside the box.
+    #[inline]
+    pub fn at(&self, x: Vec3) -> f32 {
+        if x.cmplt(self.lo).any() || x.cmpgt(self.hi).any() {
+            return -1.0;
+        }
+        let cell = (x - self.lo) / self.edge;
+        let [i, j, k] = [0, 1, 2].map(|a| (cell[a] as usize).min(self.size[a] - 1));
+        f32::from(self.quarters[(k * self.size[1] + j) * self.size[0] + i]) * (0.25 * self.edge)
+    }
+
+    /// Sets to 0 the cubes that a triangle may touch, and their neighbours: from any other cube to the triangle's own
+    /// there lies at least the gap between the two, which is the distance between the centre of the one and the
+    /// nearest neighbour of the other.
+    fn mark(&self, corners: [Vec3; 3], squares: &mut [f32]) {
+        let [a, b, c] = corners.map(|p| (p - self.lo) / self.edge);
+        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        // Half the extent of three cubes along the normal, and a little for rounding.
+        let reach = 1.5 * normal.abs().element_sum() + 1e-3;
+        let range = |axis: usize| {
+            let n = self.size[axis] as f32;
+            let (from, to) = (least[axis] - 1.001, most[axis] + 1.001);
+            if to < 0.0 || from >= n { 0..0 } else { from.max(0.0) as usize..(to.min(n - 1.0) as usize + 1) }
+        };
+        for k in range(2) {
+            for j in range(1) {
+                for i in range(0) {
+                    let centre = Vec3::new(i as f32, j as f32, k as f32) + 0.5;
+                    if normal.dot(centre - a).abs() <= reach {
+                        squares[(k * self.size[1] + j) * self.size[0] + i] = 0.0;
+                    }
+                }
+            }
+        }
+    }
+
+    /// One pass of the separable distance transform [FH12]: squares become the least of squares plus squared steps
+    /// along `axis`.
+    fn spread(&self, axis: usize, squares: &mut [f32]) {
+        let stride = [1, self.size[0], self.size[0] * self.size[1]];
+        let n = self.size[axis];
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let (mut line, mut hull, mut from) = (vec![0.0; n], Vec::with_capacity(n), Vec::with_capacity(n + 1));
+        for a in 0..self.size[u] {
+            for b in 0..self.size[v] {
+                let start = a * stride[u] + b * stride[v];
+                for (i, value) in line.iter_mut().enumerate() {
+                    *value = squares[start + i * stride[axis]];
+                }
+                lower_envelope(&line, &mut hull, &mut from);
+                let mut parabola = 0;
+                for i in 0..n {
+                    while parabola + 1 < hull.len() && from[parabola + 1] <= i as f32 {
+                        parabola += 1;
+                    }
+                    let Some(&q) = hull.get(parabola) else { continue };
+                    let step = i as f32 - q as f32;
+                    squares[start + i * stride[axis]] = step * step + line[q];
+                }
+            }
+        }
+    }
+}
+
+/// The parabolas (x - q)² + `line[q]` that are lowest somewhere, in order, and where each begins to be.
+fn lower_envelope(line: &[f32], hull: &mut Vec<usize>, from: &mut Vec<f32>) {
+    hull.clear();
+    from.clear();
+    for (q, &height) in line.iter().enumerate() {
+        if height.is_infinite() {
+            continue;
+        }
+        let mut begin = f32::NEG_INFINITY;
+        while let (Some(&p), Some(&since)) = (hull.last(), from.last()) {
+            let (x, y) = (q as f32, p as f32);
+            begin = ((height + x * x) - (line[p] + y * y)) / (2.0 * (x - y));
+            if begin > since {
+                break;
+            }
+            hull.pop();
+            from.pop();
+            begin = f32::NEG_INFINITY;
+        }
+        hull.push(q);
+        from.push(begin);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sphere;
+    use crate::math::{DVec3, hash, unit_f32};
+
+    fn distance_to_sphere(x: Vec3, radius: f32) -> f32 {
+        (x.length() - radius).abs()
+    }
+
+    #[test]
+    fn bounds_are_below_the_distance_and_not_far_below() {
+        let radius = 3.0;
+        let mesh = sphere(DVec3::ZERO, f64::from(radius), 64, 128).recentred(DVec3::ZERO);
+        let (lo, hi) = mesh.bounds().unwrap();
+        let table = Clearance::new([&mesh], lo, hi, 64);
+        let (mut sum, mut ideal) = (0.0, 0.0);
+        for i in 0..20_000_u64 {
+            let u = |d: u64| 2.0 * unit_f32((hash(3 * i + d + 1) >> 32) as u32) - 1.0;
+            let x = Vec3::new(u(0), u(1), u(2)) * radius;
+            let (bound, truth) = (table.at(x), distance_to_sphere(x, radius));
+            // The mesh lies up to 2e-3 radii inside the sphere.
+            assert!(bound >= 0.0 && bound <= truth + 1e-6, "{x}: {bound} > {truth}");
+            (sum, ideal) = (sum + bound, ideal + truth);
+        }
+        assert!(sum > 0.7 * ideal, "{sum} of {ideal}");
+    }
+
+    #[test]
+    fn large_slanted_triangles_block_their_own_cubes_only_and_outside_is_negative() {
+        let corner = [Vec3::new(-10.0, 0.0, 0.0), Vec3::new(10.0, 0.0, 20.0), Vec3::new(-10.0, 20.0, 20.0)];
+        let mesh = Mesh { positions: corner.to_vec(), triangles: vec![[0, 1, 2]], normals: None };
+        let table = Clearance::new([&mesh], Vec3::splat(-10.0), Vec3::splat(20.0), 60);
+        assert_eq!(table.at(Vec3::new(-3.0, 6.0, 13.0)), 0.0);
+        assert!(table.at(Vec3::new(15.0, 15.0, -5.0)) > 5.0);
+        assert!(table.at(Vec3::splat(21.0)) < 0.0);
+        let empty = Clearance::new([], Vec3::ZERO, Vec3::ONE, 10);
+        assert!(empty.at(Vec3::splat(0.5)) > 5.0);
+    }
+}

@@ -1,0 +1,226 @@
+//! A translucent object from the inside: flights, collisions, the boundary, until light leaves.
+
+use super::aim::Aim;
+use super::draws::Draws;
+use super::spectrum::{Coefficients, Spectrum};
+use crate::geometry::{Clearance, SurfacePoint};
+use crate::integrator::{View, WalkTally};
+use crate::math::{Rgb, Vec3};
+use crate::optics::{HenyeyGreenstein, Medium, reflect, reflectance, refract};
+use crate::query::Ray;
+use crate::sampling::cosine_hemisphere;
+use crate::scene::Surface;
+
+/// A homogeneous medium in the closed mesh of one object. Its boundary is the triangles themselves.
+pub struct Body {
+    /// Index of the object.
+    pub object: u32,
+    /// n_inside / n_outside.
+    pub eta: f32,
+    /// The medium.
+    pub medium: Coefficients,
+    /// Where collisions send light.
+    pub phase: HenyeyGreenstein,
+    /// Lower bounds of the distance to any surface, within the object's box.
+    pub clearance: Clearance,
+    /// Smallest extinction of the channels with any [1/unit]; 0 without a medium.
+    pub least_extinction: f32,
+    /// Whether the medium goes on beyond the object's box: sheets and meshes with holes.
+    pub endless: bool,
+    /// Lamps to aim at.
+    pub aims: Vec<Aim>,
+    /// Collisions between two looks at the weight.
+    pub patience: u32,
+}
+
+/// The straight flight between two collisions.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// Length [unit].
+    pub length: f32,
+    /// Phase function at its start [1/sr].
+    pub phase: f32,
+}
+
+/// Who watches a path inside a body.
+pub trait Watch {
+    /// Light that travelled along `w` is scattered at `x`, by the path's weight `spectrum` (the collision's albedo is in
+    /// it). `edge` is the straight flight from the collision before, if no surface lay between. False ends the path.
+    fn collision(&mut self, x: Vec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool;
+}
+
+/// Where and how a path left a body.
+pub struct Exit {
+    /// The point, its normals outwards.
+    pub at: SurfacePoint,
+    /// Refracted direction outside.
+    pub w: Vec3,
+    /// Whether it came there straight from a collision.
+    pub straight: bool,
+}
+
+/// Surface events in a row after which a path goes on by chance, lest it circle for ever without absorption.
+const PATIENT_BOUNCES: u32 = 64;
+/// That chance.
+const BOUNCE_SURVIVAL: f32 = 0.9;
+/// A path that has lost more than this part of its weight goes on by chance.
+const ROULETTE_BELOW: f32 = 0.25;
+
+/// What ends a flight, and after which length.
+pub enum Flight {
+    /// Its own length.
+    Collision(Vec3),
+    /// The body's own boundary from inside, normals outwards.
+    Boundary(SurfacePoint, f32),
+    /// An opaque surface inside, with its albedo.
+    Opaque(SurfacePoint, f32, Rgb),
+    /// A hole of the mesh, the wrong side of a face, or another medium.
+    Lost,
+}
+
+impl Body {
+    /// The object number `object`, with a table of the surfaces in its box.
+    pub fn new(object: u32, medium: &Medium, clearance: Clearance, aims: Vec<Aim>) -> Self {
+        let coefficients = Coefficients::new(medium);
+        let absorbed = 1.0 - coefficients.albedo.max();
+        let extinctions = coefficients.sigma_t.0.into_iter().filter(|s| *s > 0.0);
+        let least = extinctions.fold(f32::INFINITY, f32::min);
+        Self {
+            object,
+            eta: medium.eta,
+            patience: (0.1 / absorbed.max(1e-3)).clamp(1.0, 64.0) as u32,
+            least_extinction: if least.is_finite() { least } else { 0.0 },
+            medium: coefficients,
+            phase: HenyeyGreenstein { g: medium.g },
+            clearance,
+            endless: false,
+            aims,
+        }
+    }
+
+    /// p(cos θ) [1/sr] between two directions of propagation.
+    #[inline]
+    pub fn phase(&self, from: Vec3, to: Vec3) -> f32 {
+        if self.phase.g == 0.0 {
+            return 0.25 * std::f32::consts::FRAC_1_PI;
+        }
+        self.phase.value(f64::from(from.dot(to)).clamp(-1.0, 1.0)) as f32
+    }
+
+    #[inline]
+    pub fn scatter(&self, w: Vec3, draws: &mut Draws) -> Vec3 {
+        if self.phase.g == 0.0 {
+            return draws.direction();
+        }
+        let u = draws.pair();
+        self.phase.sample(w, u).normalize()
+    }
+
+    /// From `from` along `w`, a collision at `distance` unless a surface comes first. No ray where the table is sure.
+    #[inline]
+    pub fn flight(&self, view: View<'_>, from: Vec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Flight {
+        if distance < self.clearance.at(from) {
+            tally.clear += 1;
+            return Flight::Collision(from + w * distance);
+        }
+        tally.rays += 1;
+        let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
+            let x = from + w * distance;
+            return if self.endless || self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
+        };
+        let object = &view.scene.objects[hit.mesh as usize];
+        let at = object.mesh.point(hit.triangle, hit.u, hit.v);
+        if hit.mesh == self.object {
+            return if at.n_geometric.dot(w) > 0.0 { Flight::Boundary(at, hit.t) } else { Flight::Lost };
+        }
+        match &view.scene.materials[object.material].surface {
+            Surface::Diffuse { albedo } => Flight::Opaque(at.facing(-w), hit.t, *albedo),
+            Surface::Emissive { .. } | Surface::Translucent(_) => Flight::Lost,
+        }
+    }
+
+    /// Follows light from `from`, inside, along `w` until it leaves; `None` where it is absorbed, ended by `watch`, or
+    /// lost: it met a hole of the mesh, the wrong side of a face, or another medium.
+    ///
+    /// A path whose weight has fallen goes on with a chance in proportion to what is left, and is weighted by its
+    /// inverse. There is no limit of bounces.
+    pub fn walk(
+        &self,
+        view: View<'_>,
+        mut from: Vec3,
+        mut w: Vec3,
+        spectrum: &mut Spectrum,
+        draws: &mut Draws,
+        watch: &mut impl Watch,
+        tally: &mut WalkTally,
+    ) -> Option<Exit> {
+        tally.walks += 1;
+        let whole = spectrum.value(&self.medium).max();
+        let (mut collisions, mut bounces, mut edge) = (0_u32, 0_u32, None);
+        loop {
+            let distance = spectrum.distance(&self.medium, draws.number());
+            match self.flight(view, from, w, distance, tally) {
+                Flight::Collision(x) => {
+                    tally.collisions += 1;
+                    (collisions, bounces) = (collisions + 1, 0);
+                    spectrum.collide(distance);
+                    let edge_here = edge.map(|phase| Edge { length: distance, phase });
+                    if !watch.collision(x, w, edge_here, spectrum, draws) {
+                        return None;
+                    }
+                    if collisions % self.patience == 0 {
+                        let left = spectrum.value(&self.medium).max() / whole;
+                        if !survives(left / ROULETTE_BELOW, spectrum, draws) {
+                            return None;
+                        }
+                    }
+                    let next = self.scatter(w, draws);
+                    edge = Some(self.phase(w, next));
+                    (from, w) = (x, next);
+                }
+                Flight::Boundary(at, t) => {
+                    spectrum.fly(t);
+                    let inwards = -at.n_geometric;
+                    let mu = -w.dot(inwards);
+                    if draws.number() >= reflectance(1.0 / self.eta, mu)
+                        && let Some(out) = refract(-w, inwards, 1.0 / self.eta)
+                    {
+                        spectrum.leave(&self.medium);
+                        return Some(Exit { at, w: out, straight: edge.is_some() });
+                    }
+                    w = reflect(-w, inwards);
+                    (from, edge, bounces) = (at.leave(w), None, bounces + 1);
+                }
+                Flight::Opaque(at, t, albedo) => {
+                    spectrum.fly(t);
+                    spectrum.scale(albedo);
+                    if albedo.is_black() || !survives(albedo.max(), spectrum, draws) {
+                        return None;
+                    }
+                    w = cosine_hemisphere(at.n_geometric, draws.pair());
+                    (from, edge, bounces) = (at.leave(w), None, bounces + 1);
+                }
+                Flight::Lost => {
+                    tally.lost += 1;
+                    return None;
+                }
+            }
+            if bounces > PATIENT_BOUNCES && !survives(BOUNCE_SURVIVAL, spectrum, draws) {
+                return None;
+            }
+        }
+    }
+}
+
+/// Roulette: true with probability `chance`, and then the path is worth 1/`chance` more.
+#[inline]
+pub fn survives(chance: f32, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
+    if chance >= 1.0 {
+        return true;
+    }
+    if draws.number() >= chance {
+        return false;
+    }
+    spectrum.scale(Rgb::splat(1.0 / chance));
+    true
+}

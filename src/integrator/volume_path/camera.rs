@@ -1,0 +1,265 @@
+//! A path from the camera through the whole scene.
+
+use super::VolumePath;
+use super::aim::{Aim, aimed_light};
+use super::body::{Body, Edge, Watch, survives};
+use super::cells::Cells;
+use super::connect::{Scratch, connect, walked_share};
+use super::draws::Draws;
+use super::spectrum::Spectrum;
+use crate::geometry::SurfacePoint;
+use crate::integrator::{Tally, View, WalkTally};
+use crate::light::emitted;
+use crate::math::{Rgb, Vec3};
+use crate::optics::{reflect, reflectance, refract, transmittance};
+use crate::query::{Hit, Ray};
+use crate::sampling::cosine_hemisphere;
+use crate::scene::{Orders, Surface};
+use std::f32::consts::FRAC_1_PI;
+
+/// A path and what it has found.
+pub struct CameraPath<'a> {
+    pub method: &'a VolumePath,
+    pub view: View<'a>,
+    pub photons: &'a [Option<Cells>],
+    pub scratch: &'a mut Scratch,
+    pub tally: &'a mut Tally,
+    pub draws: Draws,
+    /// Numbers for connections, so that they do not disturb the walk's.
+    pub coins: Draws,
+    pub spectrum: Spectrum,
+    /// Share of lamps that the next exit from the present body may meet: photons have the rest.
+    pub direct: f32,
+    /// Share of all other light.
+    pub other: f32,
+    /// Times scattered in media.
+    pub order: u32,
+    /// Whether a lamp that is met counts: not where one was asked for at the last surface.
+    pub meets_lamps: bool,
+    /// Lamps that were aimed at from the collision before, and do not count either.
+    pub aimed: &'a [Aim],
+    pub radiance: Rgb,
+}
+
+/// Surfaces in a row after which a path goes on by chance, and the chance.
+const PATIENT_BOUNCES: u32 = 16;
+const BOUNCE_SURVIVAL: f32 = 0.8;
+
+impl<'a> CameraPath<'a> {
+    /// Adds light of the present order.
+    fn add(&mut self, light: Rgb) {
+        if self.method.options.orders.contains(self.order) {
+            self.radiance += light;
+        }
+    }
+
+    /// Follows `ray` outside all bodies until nothing is left.
+    pub fn trace(&mut self, mut ray: Ray) {
+        for bounces in 0_u32.. {
+            self.tally.rays.bounce += 1;
+            let Some(hit) = self.view.rays.closest(&ray) else {
+                self.add(self.spectrum.value_outside() * self.method.light.lights.environment() * self.other);
+                return;
+            };
+            let Some(next) = self.meet(&hit, ray.direction) else { return };
+            if bounces >= PATIENT_BOUNCES && !survives(BOUNCE_SURVIVAL, &mut self.spectrum, &mut self.draws) {
+                return;
+            }
+            ray = next;
+        }
+    }
+
+    /// Adds what shines at the end of `ray`, and nothing else.
+    pub fn meet_light(&mut self, ray: &Ray) {
+        self.tally.rays.bounce += 1;
+        match self.view.rays.closest(ray) {
+            None => self.add(self.spectrum.value_outside() * self.method.light.lights.environment()),
+            Some(hit) if self.aimed.iter().all(|aim| aim.object != hit.mesh) => {
+                self.add(self.spectrum.value_outside() * emitted(self.view.scene, &hit, ray.direction));
+            }
+            Some(_) => {}
+        }
+    }
+
+    /// Goes on from a surface that the camera sees.
+    pub fn resume(&mut self, hit: &Hit, direction: Vec3) {
+        if let Some(ray) = self.meet(hit, direction) {
+            self.trace(ray);
+        }
+    }
+
+    /// What a surface adds, and the ray on which the path goes on.
+    fn meet(&mut self, hit: &Hit, direction: Vec3) -> Option<Ray> {
+        let at = self.view.point(hit, direction);
+        let aimed = std::mem::take(&mut self.aimed);
+        match self.view.scene.surface(hit.mesh) {
+            Surface::Emissive { .. } => {
+                if self.meets_lamps && aimed.iter().all(|aim| aim.object != hit.mesh) {
+                    self.add(self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * self.direct);
+                }
+                None
+            }
+            Surface::Diffuse { albedo } => self.diffuse(&at, *albedo),
+            Surface::Translucent(_) => {
+                self.direct = self.other;
+                let body = self.method.bodies[hit.mesh as usize].as_ref()?;
+                if !self.faces(hit, direction) || self.other <= 0.0 {
+                    return None;
+                }
+                let mu = -at.n_geometric.dot(direction);
+                self.meets_lamps = true;
+                if self.draws.number() < reflectance(body.eta, mu) {
+                    let w = reflect(-direction, at.n_geometric);
+                    return Some(Ray::new(at.leave(w), w));
+                }
+                let w = refract(-direction, at.n_geometric, body.eta)?;
+                self.inside(body, &at, w)
+            }
+        }
+    }
+
+    /// Whether a body is met from outside; the inner side of a face is a hole of its mesh, and counted.
+    pub fn faces(&mut self, hit: &Hit, direction: Vec3) -> bool {
+        let n = self.view.scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
+        let outside = n.dot(direction) < 0.0;
+        self.tally.walk.lost += u64::from(!outside);
+        outside
+    }
+
+    fn diffuse(&mut self, at: &SurfacePoint, albedo: Rgb) -> Option<Ray> {
+        self.direct = self.other;
+        if self.other <= 0.0 {
+            return None;
+        }
+        self.spectrum.scale(albedo);
+        let lights = &self.method.light.lights;
+        if lights.has_emitters() {
+            let u = [self.draws.number(), self.draws.number(), self.draws.number()];
+            if let Some(arrival) = lights.sample_emitter(self.view.scene, at, u) {
+                self.tally.rays.shadow += 1;
+                if !self.view.rays.occluded(&arrival.shadow) {
+                    self.add(self.spectrum.value_outside() * arrival.irradiance * (FRAC_1_PI * self.other));
+                }
+            }
+        }
+        if albedo.is_black() || !survives(albedo.max(), &mut self.spectrum, &mut self.draws) {
+            return None;
+        }
+        let w = cosine_hemisphere(at.n, self.draws.pair());
+        self.meets_lamps = false;
+        (at.n_geometric.dot(w) > 0.0).then(|| Ray::new(at.leave(w), w))
+    }
+
+    /// Through a body from `at`, refracted into `w`; the ray on which the path leaves it.
+    pub fn inside(&mut self, body: &'a Body, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
+        let (mut spectrum, mut draws) = (self.spectrum, self.draws.clone());
+        let mut walks = WalkTally::default();
+        let view = self.view;
+        let mut watch = Gather { path: self, body };
+        let exit = body.walk(view, at.leave(w), w, &mut spectrum, &mut draws, &mut watch, &mut walks);
+        (self.spectrum, self.draws) = (spectrum, draws);
+        self.tally.walk += walks;
+        let exit = exit?;
+        self.meets_lamps = true;
+        self.aimed = if exit.straight { &body.aims } else { &[] };
+        Some(Ray::new(exit.at.leave(exit.w), exit.w))
+    }
+}
+
+/// A path inside a body: connects to photons, and lets the walk keep its share.
+struct Gather<'a, 'b> {
+    path: &'a mut CameraPath<'b>,
+    body: &'a Body,
+}
+
+impl Watch for Gather<'_, '_> {
+    fn collision(&mut self, x: Vec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
+        let (path, body) = (&mut *self.path, self.body);
+        path.order += 1;
+        if path.method.options.orders.none_above(path.order) {
+            return false;
+        }
+        let (source, cells) = (&path.method.sources[body.object as usize], path.photons.get(body.object as usize));
+        let photons = source.as_ref().zip(cells.and_then(Option::as_ref));
+        if let (Some((source, _)), Some(edge), true) = (photons, edge, path.direct > 0.0) {
+            let share = walked_share(source.yielding, source.reach, edge.length, edge.phase);
+            if share < 1.0 && draws.number() >= share {
+                path.direct = 0.0;
+                if path.other > 0.0 && draws.number() < path.method.persistence {
+                    path.other /= path.method.persistence;
+                } else {
+                    path.other = 0.0;
+                }
+            }
+        }
+        if path.direct <= 0.0 {
+            return path.other > 0.0;
+        }
+        let orders = path.method.options.orders;
+        if !body.aims.is_empty() && orders.contains(path.order) {
+            let light = aimed_light(path.view, body, x, w, spectrum, &mut path.coins, &mut path.tally.walk);
+            path.radiance += light * path.direct;
+        }
+        if let (Some((source, cells)), true) = (photons, orders.contains(path.order + 1)) {
+            let (coins, tally) = (&mut path.coins, &mut path.tally.walk);
+            let light = connect(path.view, body, cells, source.yielding, x, w, path.scratch, coins, tally);
+            // Radiance falls by η² on its way out.
+            path.radiance += spectrum.value(&body.medium) * light * (path.direct / (body.eta * body.eta));
+        }
+        true
+    }
+}
+
+impl Orders {
+    /// Whether light scattered `order` times is wanted.
+    pub fn contains(self, order: u32) -> bool {
+        match self {
+            Self::All => true,
+            Self::None => order == 0,
+            Self::Single => order == 1,
+            Self::Multiple => order >= 2,
+        }
+    }
+
+    /// Whether a path that has been scattered `order` times can be dropped.
+    pub fn none_above(self, order: u32) -> bool {
+        match self {
+            Self::None => order > 0,
+            Self::Single => order > 1,
+            Self::All | Self::Multiple => false,
+        }
+    }
+}
+
+/// Both parts of what the camera sees on a body: the mirror image of what is around it, and the light from inside.
+pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) {
+    if !path.faces(hit, direction) {
+        return;
+    }
+    let (spectrum, draws) = (path.spectrum, path.draws.clone());
+    if path.method.options.specular {
+        let at = path.view.point(hit, direction);
+        let n = at.normal_seen_from(-direction);
+        path.spectrum.scale(Rgb::splat(reflectance(body.eta, -n.dot(direction))));
+        let w = reflect(-direction, n);
+        path.draws = draws.fork(1);
+        path.trace(Ray::new(at.leave(w), w));
+    }
+    (path.spectrum, path.draws) = (spectrum, draws);
+    (path.direct, path.other, path.order, path.meets_lamps) = (1.0, 1.0, 0, true);
+    if let Some(ray) = enter(path, body, hit, direction) {
+        path.trace(ray);
+    }
+}
+
+/// From the camera into a body and through it; the ray on which the path leaves.
+pub fn enter<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) -> Option<Ray> {
+    let at = path.view.point(hit, direction);
+    // As in `subsurface`: what leaves towards the viewer is shaded with the interpolated normal.
+    let n = at.normal_seen_from(-direction);
+    let passed = transmittance(body.eta, -n.dot(direction));
+    let refracted = refract(-direction, n, body.eta).filter(|w| w.dot(at.n_geometric) < 0.0);
+    let w = refracted.or_else(|| refract(-direction, at.n_geometric, body.eta))?;
+    path.spectrum.scale(Rgb::splat(passed));
+    if passed > 0.0 { path.inside(body, &at, w) } else { None }
+}

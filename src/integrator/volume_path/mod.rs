@@ -1,0 +1,238 @@
+//! Paths through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach.
+//! Read first: `camera.rs` (a path through the scene), `body.rs` (inside one object), then `connect.rs` (what makes it fast).
+
+mod aim;
+mod body;
+mod camera;
+mod cells;
+mod connect;
+mod draws;
+mod nested;
+mod pencil;
+mod photons;
+mod spectrum;
+
+use super::shade::DirectLight;
+use super::{CameraRay, Integrator, Part, Tally, View, WalkTally};
+use crate::error::{Error, Result};
+use crate::geometry::Clearance;
+use crate::light::{Lights, emitted};
+use crate::math::Rgb;
+use crate::query::{Hit, RayTally};
+use crate::sampling::PixelStream;
+use crate::scene::{Orders, Scene, Surface};
+use body::Body;
+use camera::{CameraPath, both_parts, enter};
+use cells::Cells;
+use connect::Scratch;
+use draws::Draws;
+pub use pencil::Left;
+use photons::Source;
+use spectrum::Spectrum;
+
+/// Options of [`VolumePath`].
+#[derive(Clone, Copy, Debug)]
+pub struct VolumePathOptions {
+    /// How often the light may have been scattered in media.
+    pub orders: Orders,
+    /// Photons traced from the area lights into each body in a pass; 0 for none.
+    pub photons: u32,
+    /// Whether the camera sees mirror images on bodies.
+    pub specular: bool,
+    /// Seed of the render.
+    pub seed: u64,
+}
+
+/// Unbiased light transport: Lambertian surfaces, lamps, environment, and homogeneous media with Henyey-Greenstein
+/// scattering inside closed meshes with a smooth dielectric boundary.
+pub struct VolumePath {
+    options: VolumePathOptions,
+    light: DirectLight,
+    /// One for each object; `None` where it is not translucent.
+    bodies: Vec<Option<Body>>,
+    sources: Vec<Option<Source>>,
+    /// Chance that a path goes on for light other than that of lamps on the body itself, once photons have that.
+    persistence: f32,
+}
+
+/// Cubes along the longest side of the tables of distances.
+const CLEARANCE_CELLS: u32 = 96;
+/// Connections reach this many mean free paths (by the mean extinction of the channels).
+const REACH: f32 = 3.0;
+
+impl VolumePath {
+    /// Tables for the translucent objects of `scene`, and for no others.
+    ///
+    /// # Errors
+    /// One translucent object inside another.
+    pub fn new(scene: &Scene, options: VolumePathOptions) -> Result<Self> {
+        if let Some([a, b]) = nested::nested(scene) {
+            return Err(Error::scene(format!(
+                "{}: the translucent objects {a:?} and {b:?} overlap: `volume_path` knows one medium at a place; \
+                 move them apart, or cut one out of the other",
+                scene.name
+            )));
+        }
+        let lights = Lights::new(scene);
+        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(|i| body(scene, i, CLEARANCE_CELLS)).collect();
+        let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
+        let source = |body: &Option<Body>| {
+            let body = body.as_ref().filter(|_| multiple && options.photons > 0 && lights.has_emitters())?;
+            let reach = REACH / body.medium.sigma_t.mean();
+            let scatters = body.medium.albedo.max() > 0.0;
+            scatters.then(|| Source::new(scene, body, &lights, options.photons, reach, options.seed)).flatten()
+        };
+        let sources = bodies.iter().map(source).collect();
+        let diffuse =
+            scene.objects.iter().any(|o| matches!(scene.materials[o.material].surface, Surface::Diffuse { .. }));
+        let persistence = match (lights.has_environment(), diffuse) {
+            (true, _) => 1.0,
+            (false, true) => 0.5,
+            (false, false) => 0.1,
+        };
+        Ok(Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence })
+    }
+
+    fn shade(
+        &self,
+        view: View<'_>,
+        pass: &[Option<Cells>],
+        ray: &CameraRay,
+        scratch: &mut Scratch,
+        tally: &mut Tally,
+        hit: &Hit,
+    ) -> Rgb {
+        let direction = ray.ray.direction;
+        let mut path = self.path(view, pass, ray.stream, scratch, tally);
+        match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
+            (Some(body), _) => both_parts(&mut path, body, hit, direction),
+            (None, Surface::Emissive { .. }) => path.radiance = self.of_order_0(emitted(view.scene, hit, direction)),
+            _ => path.resume(hit, direction),
+        }
+        path.radiance
+    }
+
+    /// A path that has not left the camera yet.
+    fn path<'a>(
+        &'a self,
+        view: View<'a>,
+        photons: &'a [Option<Cells>],
+        mut stream: PixelStream,
+        scratch: &'a mut Scratch,
+        tally: &'a mut Tally,
+    ) -> CameraPath<'a> {
+        let ([a, b], [c, d]) = (stream.next_2d(), stream.next_2d());
+        let mut draws = Draws::new(&[a, b, c, d], stream.key());
+        CameraPath {
+            method: self,
+            view,
+            photons,
+            scratch,
+            tally,
+            coins: draws.fork(0),
+            spectrum: Spectrum::new(Rgb::WHITE, draws.number()),
+            draws,
+            direct: 1.0,
+            other: 1.0,
+            order: 0,
+            meets_lamps: true,
+            aimed: &[],
+            radiance: Rgb::BLACK,
+        }
+    }
+
+    /// What a model of orders 2 and higher leaves out, for the objects that `wanted` names; see `single.rs`. Holes of
+    /// meshes and objects in one another are no fault here.
+    pub(super) fn once(scene: &Scene, wanted: impl Fn(usize) -> bool, seed: u64) -> Self {
+        let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
+        let endless = |body: Body| Body { endless: true, ..body };
+        let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
+        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
+        let sources = bodies.iter().map(|_| None).collect();
+        Self {
+            options,
+            light: DirectLight { lights: Lights::new(scene), samples: 1 },
+            bodies,
+            sources,
+            persistence: 1.0,
+        }
+    }
+
+    /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
+    pub(super) fn scattered_once(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, tally: &mut Tally) -> Rgb {
+        let Some(body) = &self.bodies[hit.mesh as usize] else { return Rgb::BLACK };
+        let mut scratch = Scratch::default();
+        let mut path = self.path(view, &[], ray.stream.split(0, 1), &mut scratch, tally);
+        if let Some(out) = enter(&mut path, body, hit, ray.ray.direction) {
+            path.meet_light(&out);
+        }
+        path.radiance
+    }
+
+    fn of_order_0(&self, light: Rgb) -> Rgb {
+        if self.options.orders.contains(0) { light } else { Rgb::BLACK }
+    }
+}
+
+/// The body of object number `index`, where it is translucent and has a size.
+fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
+    let object = &scene.objects[index];
+    let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
+    let (lo, hi) = object.mesh.bounds()?;
+    let meshes = scene.objects.iter().map(|o| &o.mesh);
+    let clearance = Clearance::new(meshes, lo, hi, cells);
+    Some(Body::new(index as u32, &t.medium, clearance, aim::aims(scene, index as u32)))
+}
+
+impl Integrator for VolumePath {
+    type Pass = Vec<Option<Cells>>;
+
+    fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        let fill = |(source, body): (&Option<Source>, &Option<Body>)| {
+            let (source, body) = (source.as_ref()?, body.as_ref()?);
+            let mut work = (RayTally::default(), WalkTally::default());
+            let cells = source.trace(view, body, &self.light.lights, pass, &mut work);
+            tally.rays += work.0;
+            tally.walk += work.1;
+            tally.walk.photons += u64::from(source.count);
+            Some(cells)
+        };
+        self.sources.iter().zip(&self.bodies).map(fill).collect()
+    }
+
+    fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
+        let hits = view.camera_hits(rays, tally);
+        let mut scratch = Scratch::default();
+        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+            *out = match hit {
+                None => self.of_order_0(self.light.lights.environment()),
+                Some(hit) => self.shade(view, pass, ray, &mut scratch, tally, hit),
+            };
+        }
+    }
+
+    fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let mut parts = self.light.parts(scene);
+        for (object, (body, source)) in scene.objects.iter().zip(self.bodies.iter().zip(&self.sources)) {
+            if body.is_none() {
+                continue;
+            }
+            let name = &object.name;
+            parts.push(Part::built(format!("distances in `{name}`"), "flights far from any surface need no ray"));
+            parts.push(match source {
+                Some(source) => Part::built(
+                    format!("photons in `{name}`"),
+                    format!("{} a pass, joined to paths from the camera within {:.3} unit", source.count, source.reach),
+                ),
+                None if !self.light.lights.has_emitters() => {
+                    Part::left_out(format!("photons in `{name}`"), "no area light: paths meet all light by themselves")
+                }
+                None => Part::left_out(format!("photons in `{name}`"), "switched off, or nothing for them to do"),
+            });
+        }
+        if self.bodies.iter().all(Option::is_none) {
+            parts.push(Part::left_out("media", "no translucent material"));
+        }
+        parts
+    }
+}

@@ -1,0 +1,52 @@
+//! One beam into one body and where it comes out: the walk of the renderer alone, for profiles and totals.
+
+use super::VolumePath;
+use super::body::{Edge, Watch};
+use super::draws::Draws;
+use super::spectrum::Spectrum;
+use crate::integrator::{View, WalkTally};
+use crate::math::{Rgb, Vec3};
+
+/// Light that has left a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Left {
+    /// Where [unit].
+    pub x: Vec3,
+    /// Unit direction outside.
+    pub w: Vec3,
+    /// Its share of the light that entered: the mean over paths is an average of outcomes, at most 3 a path.
+    pub weight: Rgb,
+    /// Times scattered.
+    pub order: u32,
+}
+
+/// Counts collisions.
+struct Count(u32);
+
+impl Watch for Count {
+    fn collision(&mut self, _: Vec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut Draws) -> bool {
+        self.0 += 1;
+        true
+    }
+}
+
+impl VolumePath {
+    /// Follows light that starts at `x`, inside the translucent object number `object`, along the unit vector `w` until
+    /// it leaves for the first time; `None` where it is absorbed or lost. `key` decides on all random numbers, but for
+    /// `u` in [0, 1), which picks the channel that distances are drawn for: spread it evenly over the paths.
+    pub fn pencil(
+        &self,
+        view: View<'_>,
+        object: u32,
+        (x, w): (Vec3, Vec3),
+        u: f32,
+        key: u64,
+        tally: &mut WalkTally,
+    ) -> Option<Left> {
+        let body = self.bodies.get(object as usize)?.as_ref()?;
+        let mut draws = Draws::new(&[], key);
+        let (mut spectrum, mut count) = (Spectrum::new(Rgb::WHITE, u), Count(0));
+        let exit = body.walk(view, x, w, &mut spectrum, &mut draws, &mut count, tally)?;
+        Some(Left { x: exit.at.x, w: exit.w, weight: spectrum.value_outside(), order: count.0 })
+    }
+}
