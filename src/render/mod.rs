@@ -184,12 +184,18 @@ fn render_pass<I: Integrator>(
         })
         .collect();
     outcome.seconds.cache += (filled - start).as_secs_f64();
-    outcome.seconds.gather += filled.elapsed().as_secs_f64();
-    let Some(rendered) = rendered.into_iter().collect::<Option<Vec<_>>>() else { return false };
-    for (&tile, (samples, work)) in tiles.iter().zip(rendered) {
-        film.add(tile, &samples);
-        tally += work;
+    let rendered = rendered.into_iter().collect::<Option<Vec<_>>>();
+    if let Some(rendered) = rendered {
+        let add = |(&tile, (samples, work))| {
+            tally += work;
+            (tile, samples)
+        };
+        film.add_pass(&tiles.iter().zip(rendered).map(add).collect::<Vec<_>>());
+    } else {
+        outcome.seconds.gather += filled.elapsed().as_secs_f64();
+        return false;
     }
+    outcome.seconds.gather += filled.elapsed().as_secs_f64();
     outcome.tally += tally;
     film.end_pass();
     true
