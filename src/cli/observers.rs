@@ -195,6 +195,7 @@ impl Observer for Records {
             seconds_total: self.seconds_setup + progress.seconds.total(),
             rays: progress.tally.rays,
             gather: progress.tally.gather,
+            walk: progress.tally.walk,
             error,
             own: self.own.get().as_ref().map(Into::into),
             non_finite: 0,

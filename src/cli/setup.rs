@@ -7,7 +7,7 @@ use marmor::integrator::{
 use marmor::query::Backend;
 use marmor::sampling::Points;
 use marmor::scene::{
-    DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, Surface,
+    EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, Surface, default_photons,
 };
 use marmor::{Error, Result};
 use std::path::Path;
@@ -202,7 +202,7 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
         MethodName::VolumePath => {
             let options = VolumePathOptions {
                 orders: options.orders.unwrap_or(Orders::All),
-                photons: options.photons.unwrap_or(DEFAULT_PHOTONS),
+                photons: options.photons.unwrap_or_else(|| default_photons(scene.camera.resolution)),
                 specular: options.specular.unwrap_or(true),
                 seed,
             };

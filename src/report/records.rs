@@ -3,6 +3,7 @@
 use crate::cache::GatherTally;
 use crate::error::{Error, Result};
 use crate::film::{Counts, SelfErrors};
+use crate::integrator::WalkTally;
 use crate::query::RayTally;
 use serde::Serialize;
 use std::fs::File;
@@ -29,6 +30,8 @@ pub struct Record {
     pub rays: RayTally,
     /// Cached samples and pairs of points.
     pub gather: GatherTally,
+    /// Paths inside media.
+    pub walk: WalkTally,
     /// Distance to the reference; absent without one.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub error: Option<ErrorFigures>,

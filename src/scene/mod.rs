@@ -20,6 +20,6 @@ pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
 pub use options::{
-    DEFAULT_PHOTONS, EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread,
+    EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
 };
 pub use world::{Material, Object, Scene, Surface, Translucent};

@@ -93,8 +93,11 @@ impl Estimator {
     }
 }
 
-/// [`MethodOptions::photons`] unless the scene says.
-pub const DEFAULT_PHOTONS: u32 = 16384;
+/// [`MethodOptions::photons`] unless the scene says: one for every second pixel of the picture, within bounds, so that
+/// photons and paths from the camera take about as long.
+pub fn default_photons([width, height]: [u32; 2]) -> u32 {
+    (u64::from(width) * u64::from(height) / 2).clamp(1 << 14, 1 << 18) as u32
+}
 
 named! {
     /// How the light arriving at a cached sample is found.

@@ -185,8 +185,10 @@ impl Watch for Gather<'_, '_> {
             let share = walked_share(source.yielding, source.reach, edge.length, edge.phase);
             if share < 1.0 && draws.number() >= share {
                 path.direct = 0.0;
-                if path.other > 0.0 && draws.number() < path.method.persistence {
-                    path.other /= path.method.persistence;
+                // What has been weighted up before goes on for certain: no weight is above the inverse of the chance.
+                let chance = (path.method.persistence * path.other).min(1.0);
+                if chance > 0.0 && draws.number() < chance {
+                    path.other /= chance;
                 } else {
                     path.other = 0.0;
                 }

@@ -88,7 +88,7 @@ impl VolumePath {
         let persistence = match (lights.has_environment(), diffuse) {
             (true, _) => 1.0,
             (false, true) => 0.5,
-            (false, false) => 0.1,
+            (false, false) => 0.25,
         };
         Ok(Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence })
     }
