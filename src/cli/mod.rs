@@ -2,11 +2,13 @@
 //! Not for: anything that computes. Read first: `render.rs`, the program's table of contents.
 
 mod check;
+mod converge;
 mod diff;
 mod eval;
 mod materials;
 mod observers;
 mod profile;
+mod race;
 mod render;
 mod setup;
 mod stats;
@@ -30,6 +32,8 @@ enum Command {
     Check(check::Args),
     /// Compare two pictures: RMSE and relative error with 95 % intervals
     Diff(diff::Args),
+    /// Plot the error of several methods against run time
+    Converge(converge::Args),
     /// Print or plot M(r) of one or more models of a material
     Profile(profile::Args),
     /// Evaluate S_d for rows of a CSV on standard input
@@ -47,6 +51,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Check(args) => check::run(args),
         Command::Diff(args) => diff::run(args),
+        Command::Converge(args) => converge::run(args),
         Command::Profile(args) => profile::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Materials(args) => materials::run(args),

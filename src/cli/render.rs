@@ -309,7 +309,7 @@ fn default_outputs(scene: &Path) -> Vec<PathBuf> {
 }
 
 /// SIGINT and SIGTERM set the flag; a second one ends the program at once.
-fn cancel_on_signals() -> Arc<AtomicBool> {
+pub(super) fn cancel_on_signals() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
         // In this order: the first signal finds the flag unset and only sets it.
@@ -323,7 +323,7 @@ fn cancel_on_signals() -> Arc<AtomicBool> {
 }
 
 /// `30s`, `5m`, `2h`, `500ms`, or a plain number of seconds.
-fn duration(text: &str) -> std::result::Result<Duration, String> {
+pub(super) fn duration(text: &str) -> std::result::Result<Duration, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
     let (number, factor) = units
         .into_iter()

@@ -34,6 +34,7 @@ pub struct SelfErrors {
 pub struct SelfError {
     earlier: Vec<State>,
     pixels: Option<Vec<usize>>,
+    last: Option<SelfErrors>,
 }
 
 /// Sums of radiance and passes of the two halves at one time.
@@ -79,7 +80,7 @@ impl SelfError {
 
     /// Of the pixels with these numbers, in row-major order of the film's window.
     pub fn of_pixels(pixels: Vec<usize>) -> Self {
-        Self { earlier: Vec::new(), pixels: Some(pixels) }
+        Self { pixels: Some(pixels), ..Self::default() }
     }
 
     /// The errors of `film` as it is now, which must be the film of the earlier calls with passes added, or a new one.
@@ -112,7 +113,13 @@ impl SelfError {
             self.pixels = Some(pixels);
         }
         self.keep(now);
+        self.last = Some(errors);
         Some(errors)
+    }
+
+    /// What [`Self::measure`] said last.
+    pub fn last(&self) -> Option<SelfErrors> {
+        self.last
     }
 
     /// Keeps the states at about a quarter and a half of the passes to come.

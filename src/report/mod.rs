@@ -4,13 +4,17 @@
 
 mod batch;
 mod batch_model;
+mod convergence;
 mod monte_carlo;
+mod page;
 mod plot;
 mod profile;
 mod records;
 
 pub use batch::{Batch, BatchOptions};
+pub use convergence::{Convergence, Curve as ErrorCurve, Fit, Floor, Point as ErrorPoint, Reference};
 pub use monte_carlo::{Bin, Run, channel_run};
+pub use page::{Page, Picture};
 pub use plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
 pub use profile::{Curve, Profile};
 pub use records::{ErrorFigures, Record, RecordFile, SelfFigures};
