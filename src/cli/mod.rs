@@ -2,6 +2,7 @@
 //! Not for: anything that computes. Read first: `render.rs`, the program's table of contents.
 
 mod check;
+mod compare;
 mod converge;
 mod diff;
 mod eval;
@@ -32,6 +33,8 @@ enum Command {
     Check(check::Args),
     /// Compare two pictures: RMSE and relative error with 95 % intervals
     Diff(diff::Args),
+    /// Hold several models against a reference, with pictures of where they differ
+    Compare(compare::Args),
     /// Plot the error of several methods against run time
     Converge(converge::Args),
     /// Print or plot M(r) of one or more models of a material
@@ -51,6 +54,7 @@ pub fn main() -> ExitCode {
         Command::Render(args) => render::run(args),
         Command::Check(args) => check::run(args),
         Command::Diff(args) => diff::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Converge(args) => converge::run(args),
         Command::Profile(args) => profile::run(args),
         Command::Eval(args) => eval::run(args),

@@ -74,8 +74,12 @@ impl Observer for Measure {
     }
 
     fn satisfied(&self) -> bool {
-        let fresh = self.next > FEWEST_PASSES;
-        self.target.zip(self.told.relmse()).is_some_and(|(target, told)| fresh && told.value <= target)
+        let Some((target, told)) = self.target.zip(self.told.get()) else { return false };
+        match told.relmse {
+            Some(relmse) => self.next > FEWEST_PASSES && relmse.value <= target,
+            // A black picture: nothing else will come.
+            None => self.next > 8 * FEWEST_PASSES,
+        }
     }
 }
 

@@ -41,6 +41,7 @@ pub struct Runner<'a> {
     pub seconds: Seconds,
     pub tally: Tally,
     pub own: SelfError,
+    next: u32,
 }
 
 impl<'a> Runner<'a> {
@@ -57,6 +58,7 @@ impl<'a> Runner<'a> {
             seconds: Seconds::default(),
             tally: Tally::default(),
             own: SelfError::new(),
+            next: 2,
             entrant,
         })
     }
@@ -72,6 +74,15 @@ impl<'a> Runner<'a> {
         self.seconds.gather += outcome.seconds.gather;
         self.tally += outcome.tally;
         Ok(self.film.passes() == passes && !cancel.load(Ordering::Relaxed))
+    }
+
+    /// Lets the error follow the film, in steps that cost little.
+    pub fn follow(&mut self) -> Result<()> {
+        if self.film.passes() >= self.next {
+            self.next = self.film.passes() + 1 + self.film.passes() / 8;
+            self.own.measure(&self.film);
+        }
+        Ok(())
     }
 
     /// The errors as they are now; none before the halves tell.

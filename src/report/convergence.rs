@@ -90,11 +90,11 @@ impl Point {
 
 impl Fit {
     /// Over (x, error) in ascending order of x. Errors of a growing mean go together, so the residuals count as one for
-    /// each doubling of x. None with fewer than three doublings.
+    /// each doubling of x. None with fewer than two and a half doublings.
     pub fn of(points: &[(f64, f64)]) -> Option<Self> {
         let logs: Vec<(f64, f64)> = points.iter().map(|&(x, y)| (x.ln(), y.ln())).collect();
         let doublings = (logs.last()?.0 - logs.first()?.0) / std::f64::consts::LN_2;
-        if doublings < 3.0 || logs.len() < 4 {
+        if doublings < 2.5 || logs.len() < 4 {
             return None;
         }
         // Equal weight to equal ratios of x, however close the measurements are.
@@ -124,8 +124,11 @@ impl Fit {
     }
 }
 
+/// Told noise is not believed to better than this share.
+const LEAST_WIDTH: f64 = 0.3;
+
 /// Passes before the first is left out of fits: sequences begin before they spread.
-const SETTLED: u32 = 4;
+const SETTLED: u32 = 2;
 
 impl Convergence {
     /// (x, error) of a curve's points that are told from the reference's noise.
@@ -149,8 +152,9 @@ impl Convergence {
     pub fn floor(&self, curve: &Curve) -> Option<Floor> {
         let last = curve.points.last()?;
         let value = last.measured - self.reference.noise - last.own;
-        // Told noise, the reference's noise, and the product of bias and noise, each known to some share.
-        let width = last.width.unwrap_or(1.0);
+        // Told noise, the reference's noise, and the product of bias and noise, each known to some share; told noise has an
+        // error of its own while it is large, so that less than 0.3 of it is never called bias.
+        let width = last.width.unwrap_or(1.0).max(LEAST_WIDTH);
         let parts = [width * last.own, 0.3 * self.reference.noise, width * (value.max(0.0) * last.own).sqrt()];
         Some(Floor { value, half_width: parts.iter().map(|p| p * p).sum::<f64>().sqrt() })
     }

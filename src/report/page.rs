@@ -33,13 +33,14 @@ p{margin:.4em 0;max-width:80ch}.lead{font-size:1.1rem}
 .figures{display:flex;flex-wrap:wrap;gap:16px}
 .figures>div{flex:1 1 420px;background:#fff;border:1px solid var(--line);border-radius:6px;padding:6px;min-width:0}
 .figures svg{width:100%;height:auto;display:block}
+.strip{max-width:640px;margin:.6em 0;background:#fff;border:1px solid var(--line);border-radius:6px}.strip svg{width:100%;height:auto;display:block}
 .pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(200px,1fr));gap:14px}
 figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:6px;overflow:hidden}
 figure img{display:block;width:100%;height:auto;background:#000}.pixelated{image-rendering:pixelated}
 figcaption{padding:6px 10px;font-size:.9rem;overflow-wrap:anywhere}figcaption small{color:var(--dim);display:block}
 .scroll{overflow-x:auto;background:var(--card);border:1px solid var(--line);border-radius:6px}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
-th,td{padding:6px 12px;text-align:right;border-bottom:1px solid var(--line);font-variant-numeric:tabular-nums}
+th,td{padding:6px 12px;text-align:right;white-space:nowrap;border-bottom:1px solid var(--line);font-variant-numeric:tabular-nums}
 tr:last-child td{border-bottom:0}th{color:var(--dim);font-weight:600}th:first-child,td:first-child{text-align:left}
 .small{color:var(--dim);font-size:.85rem}.small p{overflow-wrap:anywhere;max-width:none}
 ";
@@ -77,6 +78,12 @@ impl Page {
             let _ = writeln!(self.body, "<div>{svg}</div>");
         }
         self.body.push_str("</div>\n");
+        self
+    }
+
+    /// One low SVG, not wider than it must be.
+    pub fn strip(&mut self, svg: &str) -> &mut Self {
+        let _ = writeln!(self.body, "<div class=\"strip\">{svg}</div>");
         self
     }
 

@@ -153,6 +153,23 @@ impl Axis {
                         );
                     }
                 }
+                // Few decades: the numbers between them are needed to read anything off.
+                if major.len() < 3 {
+                    for decade in first - 1..=last {
+                        for k in [2, 5] {
+                            let value = f64::from(k) * 10f64.powi(decade);
+                            if (self.min..=self.max).contains(&value) {
+                                let label = if plain {
+                                    plain_number(value)
+                                } else {
+                                    format!("{k}·{}", power_of_ten(decade, false))
+                                };
+                                major.push((value, label));
+                            }
+                        }
+                    }
+                    minor.retain(|v| major.iter().all(|(m, _)| (v / m - 1.0).abs() > 1e-9));
+                }
                 (major, minor)
             }
         }
@@ -163,6 +180,12 @@ impl Axis {
 fn nice_step(rough: f64) -> f64 {
     let power = 10f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * power).find(|&step| step >= rough * 0.999).unwrap_or(10.0 * power)
+}
+
+/// Without the digits that rounding adds.
+fn plain_number(value: f64) -> String {
+    let text = format!("{value:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// The number itself, or 10 with a raised exponent.
