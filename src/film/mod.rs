@@ -22,7 +22,7 @@ pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::Image;
-pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, save, save_with_layers};
+pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, png_bytes, save, save_with_layers};
 pub use png_file::PngReport;
 pub use self_error::{SelfError, SelfErrors};
 pub use sums::{BadSample, Counts, Film};
