@@ -43,6 +43,7 @@ fn options(estimator: Estimator, seed: u64) -> SubsurfaceOptions {
         points: Points::Sobol,
         spread: Spread::Seen,
         specular: false,
+        single: true,
         light_samples: 1,
         seed,
     }

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::{Film, Window};
 use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
-use crate::sampling::{PixelStream, Turn};
+use crate::sampling::{Pairs, PixelStream, Turn};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -232,13 +232,20 @@ fn render_tile<I: Integrator>(
     let turn = Turn::of(job.seed, pass);
     let whole = if integrator.shares_tiles() { whole_tile(tile, camera.resolution) } else { tile };
     let pixels = pixels(whole);
-    let rays: Vec<CameraRay> = pixels
+    let mut places = Pairs::with_capacity(pixels.len());
+    let streams: Vec<PixelStream> = pixels
         .iter()
         .map(|&[x, y]| {
             let mut stream = PixelStream::new(turn.seed, u64::from(y) * width + u64::from(x), turn.number);
-            let ray = camera.ray([x, y], stream.next_2d());
-            CameraRay { ray, stream }
+            places.push(&mut stream);
+            stream
         })
+        .collect();
+    let rays: Vec<CameraRay> = pixels
+        .iter()
+        .zip(places.numbers())
+        .zip(streams)
+        .map(|((&pixel, place), stream)| CameraRay { ray: camera.ray(pixel, place), stream })
         .collect();
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);
