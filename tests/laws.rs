@@ -4,13 +4,15 @@
 
 use marmor::bssrdf::{Bssrdf, ModelName, ModelVisitor};
 use marmor::film::{Counts, Film, Image, Window};
-use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View};
+use marmor::integrator::{
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions,
+};
 use marmor::math::Rgb;
 use marmor::optics::{reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread, Surface};
+use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread, Surface};
 use std::fmt::Write as _;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -193,6 +195,11 @@ fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -
         all.push((name.to_string(), film(&method, scene, backend, passes.clone()).0));
     }
     all.push(("direct".into(), film(&Direct::new(scene, 2).unwrap(), scene, backend, passes.clone()).0));
+    // Bodies that are closed are traced too.
+    let traced = VolumePathOptions { orders: Orders::All, photons: 200, specular: true, seed: 3 };
+    if let Ok(method) = VolumePath::new(scene, traced) {
+        all.push(("volume_path".into(), film(&method, scene, backend, passes.clone()).0));
+    }
     // Every model with one estimator, every estimator with one model.
     let pairs = ModelName::ALL.into_iter().enumerate().map(|(i, model)| (model, ESTIMATORS[i % ESTIMATORS.len()]));
     for (model, (estimator, samples)) in pairs.chain(ESTIMATORS.map(|e| (ModelName::Better, e))) {
