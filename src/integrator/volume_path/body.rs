@@ -147,8 +147,7 @@ impl Body {
     pub fn walk(
         &self,
         view: View<'_>,
-        mut from: Vec3,
-        mut w: Vec3,
+        (mut from, mut w): (Vec3, Vec3),
         spectrum: &mut Spectrum,
         draws: &mut Draws,
         watch: &mut impl Watch,

@@ -156,7 +156,7 @@ impl<'a> CameraPath<'a> {
         let mut walks = WalkTally::default();
         let view = self.view;
         let mut watch = Gather { path: self, body };
-        let exit = body.walk(view, at.leave(w), w, &mut spectrum, &mut draws, &mut watch, &mut walks);
+        let exit = body.walk(view, (at.leave(w), w), &mut spectrum, &mut draws, &mut watch, &mut walks);
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let exit = exit?;
@@ -204,7 +204,7 @@ impl Watch for Gather<'_, '_> {
         }
         if let (Some((source, cells)), true) = (photons, orders.contains(path.order + 1)) {
             let (coins, tally) = (&mut path.coins, &mut path.tally.walk);
-            let light = connect(path.view, body, cells, source.yielding, x, w, path.scratch, coins, tally);
+            let light = connect(path.view, body, (cells, source.yielding), (x, w), path.scratch, coins, tally);
             // Radiance falls by η² on its way out.
             path.radiance += spectrum.value(&body.medium) * light * (path.direct / (body.eta * body.eta));
         }

@@ -43,10 +43,8 @@ pub fn walked_share(yielding: f32, reach: f32, length: f32, phase: f32) -> f32 {
 pub fn connect(
     view: View<'_>,
     body: &Body,
-    cells: &Cells,
-    yielding: f32,
-    x: Vec3,
-    w: Vec3,
+    (cells, yielding): (&Cells, f32),
+    (x, w): (Vec3, Vec3),
     scratch: &mut Scratch,
     coins: &mut Draws,
     tally: &mut WalkTally,

@@ -46,7 +46,7 @@ impl VolumePath {
         let body = self.bodies.get(object as usize)?.as_ref()?;
         let mut draws = Draws::new(&[], key);
         let (mut spectrum, mut count) = (Spectrum::new(Rgb::WHITE, u), Count(0));
-        let exit = body.walk(view, x, w, &mut spectrum, &mut draws, &mut count, tally)?;
+        let exit = body.walk(view, (x, w), &mut spectrum, &mut draws, &mut count, tally)?;
         Some(Left { x: exit.at.x, w: exit.w, weight: spectrum.value_outside(), order: count.0 })
     }
 }

@@ -81,7 +81,7 @@ impl Source {
                 let numbers = chunk * CHUNK..((chunk + 1) * CHUNK).min(u64::from(self.count));
                 let (mut photons, mut rays, mut walks) = (Vec::new(), RayTally::default(), WalkTally::default());
                 for number in numbers {
-                    self.photon(view, body, lights, (turn, first + number), &mut photons, &mut rays, &mut walks);
+                    self.photon(view, body, lights, (turn, first + number), &mut photons, (&mut rays, &mut walks));
                 }
                 (photons, rays, walks)
             })
@@ -119,8 +119,7 @@ impl Source {
         lights: &Lights,
         (turn, number): (Turn, u64),
         photons: &mut Vec<Photon>,
-        rays: &mut RayTally,
-        walks: &mut WalkTally,
+        (rays, walks): (&mut RayTally, &mut WalkTally),
     ) {
         let numbers = self.streams[turn.stream].numbers(number);
         let Some((at, arrival, flux)) = self.arrival(view.scene, body, lights, numbers) else { return };
@@ -137,7 +136,7 @@ impl Source {
         let coins = draws.fork(0);
         let mut spectrum = Spectrum::new(flux * (1.0 / self.count as f32), draws.number());
         let mut deposit = Deposit { body, photons, reach: self.reach, coins };
-        body.walk(view, at.leave(w), w, &mut spectrum, &mut draws, &mut deposit, walks);
+        body.walk(view, (at.leave(w), w), &mut spectrum, &mut draws, &mut deposit, walks);
     }
 }
 
