@@ -62,6 +62,9 @@ impl Cells {
     /// Rows of cubes that hold every photon within reach of `x`, as ranges of photons; into `rows`. Their number.
     pub fn near(&self, x: Vec3, rows: &mut Vec<(u32, u32)>) -> u32 {
         rows.clear();
+        if self.photons.is_empty() {
+            return 0;
+        }
         let centre = (x - self.lo) / self.edge;
         let reach = self.reach / self.edge;
         let range = |axis: usize, reach: f32| {
