@@ -8,6 +8,8 @@
 //! loop, all estimators by turns in one run. Exits are the hits of a camera's tiles, as in a render.
 #![allow(clippy::print_stdout, clippy::unwrap_used)] // a benchmark prints, and stops at what it cannot read
 
+mod bumps;
+
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
@@ -42,7 +44,7 @@ fn scene() -> (Scene, tempfile::TempDir) {
             format!("mesh = \"mesh.obj\"\ntransform = {{ scale = {scale}, translate = [{x}, {y}, {z}] }}\n")
         }
         Err(_) => {
-            std::fs::write(folder.path().join("mesh.obj"), bumps(133)).unwrap();
+            std::fs::write(folder.path().join("mesh.obj"), bumps::bumps(133)).unwrap();
             "mesh = \"mesh.obj\"\ntransform = { scale = 30 }\n".to_string()
         }
     };
@@ -57,35 +59,6 @@ fn scene() -> (Scene, tempfile::TempDir) {
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).unwrap();
     (Scene::load(&SceneFile::read(&path).unwrap()).unwrap(), folder)
-}
-
-/// OBJ text of a closed sphere with bumps, about 4 `rings`² triangles.
-fn bumps(rings: u32) -> String {
-    use std::fmt::Write as _;
-    let sectors = 2 * rings;
-    let mut text = String::new();
-    for ring in 0..=rings {
-        for sector in 0..sectors {
-            let theta = std::f32::consts::PI * ring as f32 / rings as f32;
-            let phi = std::f32::consts::TAU * sector as f32 / sectors as f32;
-            let r = 1.0 + 0.15 * (5.0 * theta).sin() * (4.0 * phi).cos() * theta.sin();
-            let (x, z) = (r * theta.sin() * phi.cos(), r * theta.sin() * phi.sin());
-            writeln!(text, "v {x} {} {z}", r * theta.cos()).unwrap();
-        }
-    }
-    let at = |ring: u32, sector: u32| ring * sectors + sector % sectors + 1;
-    for ring in 0..rings {
-        for sector in 0..sectors {
-            let [a, b, c, d] = [at(ring, sector), at(ring, sector + 1), at(ring + 1, sector + 1), at(ring + 1, sector)];
-            if ring > 0 {
-                writeln!(text, "f {a} {b} {c}").unwrap();
-            }
-            if ring + 1 < rings {
-                writeln!(text, "f {a} {c} {d}").unwrap();
-            }
-        }
-    }
-    text
 }
 
 struct Bench<'a> {

@@ -112,7 +112,7 @@ fn samples_spread_by_what_is_seen_bring_the_same_flux_as_an_even_spread() {
     let (even, stream) = (Density::even(), CacheStream::new(Points::Sobol, 99, 0));
     let points = seen(set.scene, &*set.rays);
     assert!(points[0].len() > 100 && points[1].len() < points[0].len());
-    let survey = Survey::new(&set.filler(&stream, &even, 0.0), &envelope, &points[0], Spread::Seen);
+    let survey = Survey::new(&set.filler(&stream, &even, 0.0), &envelope, &points[0], Spread::Seen, 32768);
     assert!(survey.variance > 0.0 && survey.typical.x > 0.0);
     assert!(survey.noise2(1e4) > survey.noise2(1e5));
     let found = [flux(&set, &even, 0.0), flux(&set, &survey.density, 0.0)];

@@ -6,6 +6,7 @@
 //! With `ulimit -v` a request for more memory than that ends the program. `MARMOR_FUZZ_SEED` starts elsewhere. An input
 //! that panics is printed and left in the folder for temporary files, with its number.
 #![allow(clippy::unwrap_used)] // a fixture that cannot be made is a failed test
+#![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
 use marmor::bssrdf::{KappaExtinction, ModelName, WidthFit};
 use marmor::film::{Checkpoint, Film, Identity, Image, Metadata, PngOptions, Window, read_attributes, save};

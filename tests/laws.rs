@@ -4,13 +4,15 @@
 
 use marmor::bssrdf::{Bssrdf, ModelName, ModelVisitor};
 use marmor::film::{Counts, Film, Image, Window};
-use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View};
+use marmor::integrator::{
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions,
+};
 use marmor::math::Rgb;
 use marmor::optics::{reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread, Surface};
+use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread, Surface};
 use std::fmt::Write as _;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
@@ -164,6 +166,15 @@ fn film<I: Integrator>(method: &I, scene: &Scene, backend: Backend, passes: Rang
     (film, outcome.tally)
 }
 
+/// With more samples than are summed without a tree, where there is one.
+const ESTIMATORS: [(Estimator, u32); 5] = [
+    (Estimator::Cut, 1500),
+    (Estimator::All, 100),
+    (Estimator::Notes, 100),
+    (Estimator::Thinned, 1500),
+    (Estimator::Cluster, 1500),
+];
+
 fn set_model(scene: &mut Scene, model: ModelName) {
     for material in &mut scene.materials {
         if let Surface::Translucent(t) = &mut material.surface {
@@ -184,19 +195,18 @@ fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -
         all.push((name.to_string(), film(&method, scene, backend, passes.clone()).0));
     }
     all.push(("direct".into(), film(&Direct::new(scene, 2).unwrap(), scene, backend, passes.clone()).0));
-    for model in ModelName::ALL {
+    // Bodies that are closed are traced too.
+    let traced = VolumePathOptions { orders: Orders::All, photons: 200, specular: true, seed: 3 };
+    if let Ok(method) = VolumePath::new(scene, traced) {
+        all.push(("volume_path".into(), film(&method, scene, backend, passes.clone()).0));
+    }
+    // Every model with one estimator, every estimator with one model.
+    let pairs = ModelName::ALL.into_iter().enumerate().map(|(i, model)| (model, ESTIMATORS[i % ESTIMATORS.len()]));
+    for (model, (estimator, samples)) in pairs.chain(ESTIMATORS.map(|e| (ModelName::Better, e))) {
         set_model(scene, model);
-        for (estimator, samples) in [
-            (Estimator::Cut, 1500),
-            (Estimator::All, 100),
-            (Estimator::Notes, 100),
-            (Estimator::Thinned, 1500),
-            (Estimator::Cluster, 1500),
-        ] {
-            let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
-            let name = format!("{}, {}", model.name(), estimator.name());
-            all.push((name, film(&method, scene, backend, passes.clone()).0));
-        }
+        let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
+        let name = format!("{}, {}", model.name(), estimator.name());
+        all.push((name, film(&method, scene, backend, passes.clone()).0));
     }
     all
 }
@@ -225,7 +235,7 @@ fn law_1_scale_powers_of_two_change_no_bit() {
     for backend in backends() {
         let plain = scenes(1.0, [0.0; 3]);
         let plain: Vec<_> = plain.into_iter().map(|(name, mut s)| (name, films(&mut s, backend, 0..1, 0.5))).collect();
-        for exponent in [-20, 1, 20] {
+        for exponent in [-20, 20] {
             let k = 2_f64.powi(exponent);
             for ((name, mut scene), (_, expected)) in scenes(k, [0.0; 3]).into_iter().zip(&plain) {
                 let found = films(&mut scene, backend, 0..1, 0.5 * k);

@@ -7,11 +7,13 @@ use crate::math::{Vec3, Vec4};
 use crate::query::RayQuery;
 use crate::scene::{Scene, Spread};
 
-/// Bins of equal area along the area table.
-const BINS: usize = 256;
-/// Trial samples, several a bin.
-const PILOTS: u32 = 32 * BINS as u32;
-/// Cells of the picture, across and down, through whose middles the camera looks for visible points.
+/// Trial samples for each bin of equal area along the area table.
+const PILOTS_PER_BIN: u32 = 32;
+/// Bins, at most.
+const BINS: u32 = 256;
+/// Trial samples are at most one for so many of a pass.
+const PASS_PER_PILOT: u32 = 4;
+/// Cells of the picture, across and down, through whose middles the camera looks for visible points; no more than pixels.
 const CELLS: u32 = 64;
 /// Visible points of an object that importance is measured at, at most.
 const EXITS: usize = 384;
@@ -43,9 +45,9 @@ impl Density {
         Self { cumulative: vec![0.0, 1.0] }
     }
 
-    /// One over the density in the part of bin `bin` of [`BINS`].
-    fn weight(&self, bin: usize) -> f64 {
-        f64::from(self.place(self.cumulative[(self.cumulative.len() - 1) * bin / BINS]).1)
+    /// One over the density in bin `bin` of `bins`.
+    fn weight(&self, bin: usize, bins: usize) -> f64 {
+        f64::from(self.place(self.cumulative[(self.cumulative.len() - 1) * bin / bins]).1)
     }
 
     fn of(bins: &[f64]) -> Self {
@@ -94,14 +96,17 @@ impl Survey {
         Self { density: Density::even(), typical: Vec4::ZERO, variance: 0.0 }
     }
 
-    /// Of the light that `filler` finds, as it reaches the points `seen`. [`Self::none`] where there are none or all is dark.
-    pub fn new(filler: &Filler<'_>, envelope: &Envelope, seen: &[Seen], spread: Spread) -> Self {
-        let pilots = filler.pilots(PILOTS);
+    /// Of the light that `filler` finds, as it reaches the points `seen`, for passes of `count` samples. [`Self::none`] where
+    /// there are none or all is dark.
+    pub fn new(filler: &Filler<'_>, envelope: &Envelope, seen: &[Seen], spread: Spread, count: u32) -> Self {
+        let bins = (count / PASS_PER_PILOT / PILOTS_PER_BIN).clamp(8, BINS);
+        let attempted = bins * PILOTS_PER_BIN;
+        let pilots = filler.pilots(attempted);
         let sums: Vec<Vec4> = seen.iter().map(|s| pilots.iter().map(|(_, p)| share(envelope, s, p)).sum()).collect();
         let mean = sums.iter().sum::<Vec4>() / sums.len().max(1) as f32;
         // As errors are measured: relative, but dark points count less.
         let scale: Vec<Vec4> = sums.iter().map(|&sum| inverse(sum * sum + 0.01 * mean * mean)).collect();
-        let mut bins = vec![0.0_f64; BINS];
+        let mut bins = vec![0.0_f64; bins as usize];
         for (pick, pilot) in &pilots {
             let squares: Vec4 = seen
                 .iter()
@@ -111,19 +116,20 @@ impl Survey {
                     share * share * scale
                 })
                 .sum();
-            bins[((pick * BINS as f64) as usize).min(BINS - 1)] += f64::from(squares.element_sum());
+            let bin = ((pick * bins.len() as f64) as usize).min(bins.len() - 1);
+            bins[bin] += f64::from(squares.element_sum());
         }
         let density = match spread {
             Spread::Seen => Density::of(&bins.iter().map(|b| b.sqrt()).collect::<Vec<_>>()),
             Spread::Area => Density::even(),
         };
         let counted = 3.0 * seen.len().max(1) as f64;
-        let squares: f64 = bins.iter().enumerate().map(|(b, sum)| sum * density.weight(b)).sum();
-        let variance = f64::from(PILOTS) * squares / counted;
+        let squares: f64 = bins.iter().enumerate().map(|(b, sum)| sum * density.weight(b, bins.len())).sum();
+        let variance = f64::from(attempted) * squares / counted;
         if !variance.is_finite() {
             return Self::none();
         }
-        Self { density, typical: mean / PILOTS as f32, variance }
+        Self { density, typical: mean / attempted as f32, variance }
     }
 
     /// Relative variance of the sum over the first `count` samples of a Sobol stream. That of independent ones is
@@ -151,14 +157,15 @@ fn inverse(v: Vec4) -> Vec4 {
 /// For each object of `scene`, points that the camera sees of it. A function of the scene alone.
 pub fn seen(scene: &Scene, rays: &dyn RayQuery) -> Vec<Vec<Seen>> {
     let camera = &scene.camera;
-    let [width, height] = camera.resolution.map(|r| r as f32 / CELLS as f32);
+    let [columns, rows] = camera.resolution.map(|r| r.min(CELLS));
+    let [width, height] = [(0, columns), (1, rows)].map(|(a, cells)| camera.resolution[a] as f32 / cells as f32);
     let through = |x: f32, y: f32| {
         let (i, j) = (x * width, y * height);
         camera.ray([i as u32, j as u32], [i.fract(), j.fract()])
     };
     let mut seen = vec![Vec::new(); scene.objects.len()];
-    for cell in 0..CELLS * CELLS {
-        let (x, y) = ((cell % CELLS) as f32 + 0.5, (cell / CELLS) as f32 + 0.5);
+    for cell in 0..columns * rows {
+        let (x, y) = ((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5);
         let ray = through(x, y);
         let Some(hit) = rays.closest(&ray) else { continue };
         let at: SurfacePoint = scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);

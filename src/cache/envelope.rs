@@ -9,8 +9,8 @@ use crate::optics::Medium;
 const STEPS: u32 = 4;
 /// Bits of an f32 below a step.
 const SHIFT: u32 = 23 - STEPS.trailing_zeros();
-/// Exponents of r² [unit²] covered, 2^-60 .. 2^60, as biased exponents of f32.
-const EXPONENTS: std::ops::Range<u32> = 67..187;
+/// Octaves of r² covered to each side of the medium's own scale, so that a scene and the same one scaled see the same table.
+const OCTAVES: u32 = 60;
 
 /// S_d and its slope at one distance, up to a common factor.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,10 +24,21 @@ pub struct Fall {
 /// [`Fall`] by distance.
 pub struct Envelope {
     rows: Vec<Fall>,
+    /// Upper bits of r² [unit²] at the first row.
+    first: u32,
     /// Decay per channel [1/unit].
     decay: [f32; 3],
     /// Variation of S_d over members of a node that does not come from the distance, relative: from directions or depths.
     pub other: f32,
+}
+
+/// Upper bits of the r² [unit²] that lies [`OCTAVES`] below the square of the medium's shortest transport mean free path.
+fn first_row(medium: &Medium) -> u32 {
+    let sigma = medium.sigma_t_prime().max();
+    let square = 1.0 / (sigma * sigma);
+    // Biased exponents of f32 are 1 to 254; a medium without scattering takes the middle.
+    let exponent = if square.is_normal() { (square.to_bits() >> 23).clamp(OCTAVES + 1, 254 - OCTAVES) } else { 127 };
+    (exponent - OCTAVES) << (23 - SHIFT)
 }
 
 impl Envelope {
@@ -40,8 +51,9 @@ impl Envelope {
             Model::Directional(_) => 0.3,
             _ => 0.0,
         };
-        let count = (EXPONENTS.end - EXPONENTS.start) * STEPS;
-        let distance = |i: u32| f32::from_bits(((EXPONENTS.start << (23 - SHIFT)) + i) << SHIFT).sqrt();
+        let count = 2 * OCTAVES * STEPS;
+        let first = first_row(medium);
+        let distance = |i: u32| f32::from_bits((first + i) << SHIFT).sqrt();
         let finite = |v: f32| if v > 0.0 { v.min(1e30) } else { 0.0 };
         let rows = (0..count)
             .map(|i| {
@@ -55,7 +67,7 @@ impl Envelope {
                 fall
             })
             .collect();
-        Self { rows, decay: medium.sigma_tr().0, other }
+        Self { rows, first, decay: medium.sigma_tr().0, other }
     }
 
     /// S_d at √`r2` ≥ 0, of each channel stretched until its decay length is at least `least` [unit], its integral over the
@@ -79,7 +91,7 @@ impl Envelope {
     pub fn effective_area(&self) -> f64 {
         let (mut first, mut second) = ([0.0; 3], [0.0; 3]);
         for (i, fall) in self.rows.iter().enumerate() {
-            let r2 = |i: usize| f64::from(f32::from_bits(((EXPONENTS.start << (23 - SHIFT)) + i as u32) << SHIFT));
+            let r2 = |i: usize| f64::from(f32::from_bits((self.first + i as u32) << SHIFT));
             let ring = std::f64::consts::PI * (r2(i + 1) - r2(i));
             for c in 0..3 {
                 let value = f64::from(fall.value[c]);
@@ -94,7 +106,7 @@ impl Envelope {
     /// At the largest tabulated distance up to √`r2`, `r2` ≥ 0 [unit²].
     #[inline]
     pub fn at(&self, r2: f32) -> &Fall {
-        let row = (r2.to_bits() >> SHIFT).saturating_sub(EXPONENTS.start << (23 - SHIFT));
+        let row = (r2.to_bits() >> SHIFT).saturating_sub(self.first);
         &self.rows[(row as usize).min(self.rows.len() - 1)]
     }
 }

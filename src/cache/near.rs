@@ -11,7 +11,7 @@ use std::f32::consts::{PI, TAU};
 /// Rings of the radial density, but for the innermost disk.
 const RINGS: usize = 80;
 /// Radius of the innermost disk, relative to the outermost.
-const INNERMOST: f32 = 1e-8;
+const INNERMOST: f32 = 1e-6;
 /// Share of the samples that is spread evenly over the rings, lest a model differ from the envelope.
 const EVEN: f64 = 0.1;
 /// Lines parallel to the normal.

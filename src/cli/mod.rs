@@ -18,6 +18,8 @@ macro_rules! println {
 }
 
 mod check;
+mod compare;
+mod converge;
 mod diff;
 mod eval;
 mod keep;
@@ -26,6 +28,7 @@ mod merge;
 mod observers;
 mod outputs;
 mod profile;
+mod race;
 mod render;
 mod replay;
 mod setup;
@@ -52,6 +55,10 @@ enum Command {
     Check(check::Args),
     /// Compare two pictures: RMSE and relative error with 95 % intervals
     Diff(diff::Args),
+    /// Hold several models against a reference, with pictures of where they differ
+    Compare(compare::Args),
+    /// Plot the error of several methods against run time
+    Converge(converge::Args),
     /// Print or plot M(r) of one or more models of a material
     Profile(profile::Args),
     /// Evaluate S_d for rows of a CSV on standard input
@@ -70,6 +77,8 @@ pub fn main() -> ExitCode {
         Command::Merge(args) => merge::run(args),
         Command::Check(args) => check::run(args),
         Command::Diff(args) => diff::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Converge(args) => converge::run(args),
         Command::Profile(args) => profile::run(args),
         Command::Eval(args) => eval::run(args),
         Command::Materials(args) => materials::run(args),

@@ -2,10 +2,11 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use marmor::Result;
-use marmor::film::Image;
 use marmor::film::metrics::{self, Estimate};
+use marmor::film::{Film, Image};
 use marmor::film::{SelfError, SelfErrors};
-use marmor::render::{Observer, Progress};
+use marmor::integrator::Tally;
+use marmor::render::{Observer, Progress, Seconds};
 use marmor::report::{ErrorFigures, Record, RecordFile};
 use std::cell::Cell;
 use std::io::IsTerminal;
@@ -73,8 +74,12 @@ impl Observer for Measure {
     }
 
     fn satisfied(&self) -> bool {
-        let fresh = self.next > FEWEST_PASSES;
-        self.target.zip(self.told.relmse()).is_some_and(|(target, told)| fresh && told.value <= target)
+        let Some((target, told)) = self.target.zip(self.told.get()) else { return false };
+        match told.relmse {
+            Some(relmse) => self.next > FEWEST_PASSES && relmse.value <= target,
+            // A black picture: nothing else will come.
+            None => self.next > 8 * FEWEST_PASSES,
+        }
     }
 }
 
@@ -179,30 +184,39 @@ pub struct Records {
     pub own: OwnError,
 }
 
+impl Records {
+    /// The record of a film, without errors.
+    pub fn record(seconds_setup: f64, seconds: Seconds, tally: &Tally, film: &Film) -> Record {
+        let passes = film.passes();
+        let record = Record {
+            pass: passes,
+            samples: passes,
+            seconds_setup,
+            seconds_cache: seconds.cache,
+            seconds_gather: seconds.gather,
+            seconds_total: seconds_setup + seconds.total(),
+            rays: tally.rays,
+            gather: tally.gather,
+            walk: tally.walk,
+            error: None,
+            own: None,
+            non_finite: 0,
+            clamped: tally.gather.clamped,
+            negative: 0,
+        };
+        record.with_counts(&film.counts())
+    }
+}
+
 impl Observer for Records {
     fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()> {
         let error = match &self.reference {
             Some(reference) => Some(error_figures(&progress.film.image(), reference)?),
             None => None,
         };
-        let passes = progress.film.passes();
-        let record = Record {
-            pass: passes,
-            samples: passes,
-            seconds_setup: self.seconds_setup,
-            seconds_cache: progress.seconds.cache,
-            seconds_gather: progress.seconds.gather,
-            seconds_total: self.seconds_setup + progress.seconds.total(),
-            rays: progress.tally.rays,
-            gather: progress.tally.gather,
-            walk: progress.tally.walk,
-            error,
-            own: self.own.get().as_ref().map(Into::into),
-            non_finite: 0,
-            clamped: progress.tally.gather.clamped,
-            negative: 0,
-        };
-        self.file.append(&record.with_counts(&progress.film.counts()))
+        let own = self.own.get().as_ref().map(Into::into);
+        let record = Self::record(self.seconds_setup, progress.seconds, progress.tally, progress.film);
+        self.file.append(&Record { error, own, ..record })
     }
 }
 

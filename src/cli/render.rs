@@ -369,7 +369,7 @@ fn default_outputs(args: &Args) -> Vec<PathBuf> {
 }
 
 /// `30s`, `5m`, `2h`, `500ms`, or a plain number of seconds.
-pub fn duration(text: &str) -> std::result::Result<Duration, String> {
+pub(super) fn duration(text: &str) -> std::result::Result<Duration, String> {
     let units = [("ms", 1e-3), ("s", 1.0), ("m", 60.0), ("h", 3600.0), ("", 1.0)];
     let (number, factor) = units
         .into_iter()

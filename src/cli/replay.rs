@@ -4,7 +4,7 @@ use super::setup::{Method, Prepared};
 use marmor::Result;
 use marmor::integrator::View;
 use marmor::render::{self, Job};
-use marmor::sampling::PixelStream;
+use marmor::sampling::{PixelStream, Turn};
 use std::process::ExitCode;
 
 /// Prints the sample, its ray and the first thing it meets.
@@ -21,8 +21,9 @@ pub fn run(prepared: &Prepared, view: View<'_>, job: &Job<'_>, pixel: [u32; 2], 
         Method::Subsurface(method) => render::replay(&**method, view, job, pixel, pass),
         Method::VolumePath(method) => render::replay(&**method, view, job, pixel, pass),
     };
+    let turn = Turn::of(job.seed, pass);
     let number = u64::from(y) * u64::from(width) + u64::from(x);
-    let ray = view.scene.camera.ray(pixel, PixelStream::new(job.seed, number, pass).next_2d());
+    let ray = view.scene.camera.ray(pixel, PixelStream::new(turn.seed, number, turn.number).next_2d());
     println!("pixel {x},{y}, pass {pass}, seed {}: radiance {:?}", job.seed, radiance.0);
     println!("ray from {:?} towards {:?}", ray.origin.to_array(), ray.direction.to_array());
     match view.rays.closest(&ray) {

@@ -1,10 +1,12 @@
 //! From a scene file and the options over it to a checked scene and a method: shared by `render` and `check`.
 
 use marmor::bssrdf::ModelName;
+use marmor::film::Film;
 use marmor::integrator::{
-    AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions,
+    AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
 };
 use marmor::query::Backend;
+use marmor::render::{self, Job, Observer, Outcome};
 use marmor::sampling::Points;
 use marmor::scene::{
     EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, Surface, default_photons,
@@ -13,7 +15,7 @@ use marmor::{Error, Result};
 use std::path::Path;
 
 /// Options that decide what is computed.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct MethodArgs {
     /// ambient_occlusion, direct, subsurface or volume_path [default: the scene's, else subsurface if anything is translucent]
     #[arg(long, value_name = "NAME")]
@@ -61,6 +63,22 @@ impl Method {
         }
     }
 
+    /// [`render::run`] with this method.
+    pub fn run(
+        &self,
+        view: View<'_>,
+        job: &Job<'_>,
+        film: &mut Film,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<Outcome> {
+        match self {
+            Self::AmbientOcclusion(m) => render::run(m, view, job, film, observers),
+            Self::Direct(m) => render::run(m, view, job, film, observers),
+            Self::Subsurface(m) => render::run(&**m, view, job, film, observers),
+            Self::VolumePath(m) => render::run(&**m, view, job, film, observers),
+        }
+    }
+
     /// What was built and what was left out.
     pub fn parts(&self, scene: &Scene) -> Vec<Part> {
         use marmor::integrator::Integrator as _;
@@ -85,6 +103,26 @@ pub struct Prepared {
 }
 
 impl Prepared {
+    /// Method, estimator and models in a few words.
+    pub fn describe(&self) -> String {
+        match self.method {
+            Method::Subsurface(_) => {
+                let models: Vec<&str> = self
+                    .scene
+                    .materials
+                    .iter()
+                    .filter_map(|m| match &m.surface {
+                        Surface::Translucent(t) => Some(t.model.name()),
+                        _ => None,
+                    })
+                    .collect();
+                let how = if self.as_notes { "as_notes" } else { self.estimator.name() };
+                format!("{} ({how}, {})", self.method.name(), models.join(", "))
+            }
+            _ => self.method.name().into(),
+        }
+    }
+
     /// What the EXR header says of the method.
     pub fn method_attributes(&self) -> Vec<(&'static str, String)> {
         let Method::Subsurface(_) = self.method else { return Vec::new() };
@@ -153,6 +191,47 @@ impl MethodArgs {
         words
     }
 
+    /// These options with those of `spec` over them: names joined by `+`, each of an estimator, a model, a backend or a
+    /// method, or `as_notes`, a number of cached samples a pass, or `KEY=VALUE` of the scene (`cut_error=0.1` is
+    /// `method.cut_error=0.1`).
+    pub fn variant(&self, spec: &str) -> Result<Self> {
+        let mut args = self.clone();
+        for word in spec.split('+').map(str::trim) {
+            if let Ok(estimator) = word.parse() {
+                args.estimator = Some(estimator);
+            } else if let Ok(model) = word.parse() {
+                args.model = Some(model);
+            } else if let Ok(backend) = word.parse() {
+                args.backend = Some(backend);
+            } else if let Ok(method) = word.parse() {
+                args.method = Some(method);
+            } else if word == "as_notes" {
+                args.as_notes = true;
+            } else if let Ok(samples) = word.parse::<u32>() {
+                args.define.push(format!("method.cache_samples={samples}"));
+            } else if let Some((key, _)) = word.split_once('=') {
+                args.define.push(if key.contains('.') { word.into() } else { format!("method.{word}") });
+            } else {
+                return Err(Error::usage(unknown_word(spec, word)));
+            }
+        }
+        if args.as_notes && (args.model.is_some() || args.estimator.is_some()) {
+            return Err(Error::usage(format!("`{spec}`: as_notes has its own model and estimator")));
+        }
+        Ok(args)
+    }
+
+    /// The same with another seed.
+    pub fn seeded(mut self, seed: u64) -> Self {
+        self.seed = Some(seed);
+        self
+    }
+
+    /// The seed asked for here, if any.
+    pub fn seed(&self) -> Option<u64> {
+        self.seed
+    }
+
     /// The options as keys of the scene file, so that messages, warnings and file headers know them; `-D` comes last.
     fn overrides(&self) -> Vec<String> {
         let mut keys = Vec::new();
@@ -165,6 +244,18 @@ impl MethodArgs {
         keys.extend(self.define.iter().cloned());
         keys
     }
+}
+
+fn unknown_word(spec: &str, word: &str) -> String {
+    let names = |all: Vec<&'static str>| all;
+    let mut known = names(Estimator::ALL.iter().map(|v| v.name()).collect());
+    known.extend(ModelName::ALL.iter().map(|v| v.name()));
+    known.extend(Backend::ALL.iter().map(|v| v.name()));
+    known.extend(MethodName::ALL.iter().map(|v| v.name()));
+    known.push("as_notes");
+    let hint = marmor::error::did_you_mean(word, known.iter().copied());
+    let all = known.join(", ");
+    format!("`{spec}`: nothing is called `{word}`{hint}; there are {all}, a number of samples, or key=value")
 }
 
 fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Estimator, seed: u64) -> Result<Method> {

@@ -253,7 +253,7 @@ impl Checksum {
         for &byte in bytes {
             self.word = self.word << 8 | u64::from(byte);
             self.bytes += 1;
-            if self.bytes % 8 == 0 {
+            if self.bytes.is_multiple_of(8) {
                 self.state = hash_combine(self.state, self.word);
                 self.word = 0;
             }

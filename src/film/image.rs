@@ -33,6 +33,26 @@ impl Image {
         (w.x0 <= x && x < w.x1 && w.y0 <= y && y < w.y1).then(|| self.pixels[w.index(x, y)])
     }
 
+    /// The window's pixels as a picture of their own, averaged over squares so that neither side is longer than `longest`.
+    #[must_use]
+    pub fn shrunk(&self, longest: u32) -> Self {
+        let (width, height) = (self.window.width() as u32, self.window.height() as u32);
+        let n = width.max(height).div_ceil(longest.max(1)).max(1);
+        Self::from_fn([(width / n).max(1), (height / n).max(1)], |x, y| {
+            let (mut sum, mut count) = (Rgb::BLACK, 0.0);
+            for v in (y * n..((y + 1) * n).min(height)).map(|v| self.window.y0 + v) {
+                for u in (x * n..((x + 1) * n).min(width)).map(|u| self.window.x0 + u) {
+                    let pixel = self.pixels[self.window.index(u, v)];
+                    if pixel.is_finite() {
+                        sum += pixel;
+                        count += 1.0;
+                    }
+                }
+            }
+            if count > 0.0 { sum * (1.0 / count) } else { Rgb::BLACK }
+        })
+    }
+
     /// The part of this picture inside `window`, which may be empty.
     #[must_use]
     pub fn cropped(&self, window: Window) -> Self {

@@ -252,7 +252,7 @@ impl Ratio {
 
 /// The 0.975 quantile of Student's t: 95 % of it lies within plus or minus this. Exact to 4 digits for one and two
 /// degrees of freedom, else by the expansion about the normal quantile [AS64, 26.7.5] (0.2 % at three, better above).
-pub(super) fn student_975(freedom: usize) -> f64 {
+pub fn student_975(freedom: usize) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     match freedom {
         0 => f64::INFINITY,

@@ -1,6 +1,7 @@
 //! What becomes of radiance samples: sums per pixel, pictures, files, and figures that compare pictures.
 //! Not for: how a sample is made, passes and threads (`render`), or records over time (`report`).
-//! Read first: `sums.rs` (the film), then `output.rs` (saving). docs/output.md tells users what is in the files.
+//! Read first: `sums.rs` (the film; its sums are `exact.rs`), then `output.rs` (saving) and `checkpoint.rs` (film files).
+//! docs/output.md and docs/robustness.md tell users what is in the files.
 
 mod atomic;
 mod checkpoint;
@@ -21,7 +22,7 @@ pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::Image;
-pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, save, save_with_layers};
+pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, png_bytes, save, save_with_layers};
 pub use png_file::PngReport;
 pub use self_error::{SelfError, SelfErrors};
 pub use sums::{BadSample, Counts, Film};

@@ -109,6 +109,17 @@ pub fn save_with_layers(
     }
 }
 
+/// The bytes of a PNG file of `image`, scaled by 2^`exposure` (a finite number of stops).
+///
+/// # Errors
+/// Usage for a picture that PNG cannot hold, such as an empty one.
+pub fn png_bytes(image: &Image, exposure: f64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    png_file::encode(image, exposure, &mut bytes)
+        .map_err(|e| Error::usage(format!("cannot make a PNG of this picture: {e}")))?;
+    Ok(bytes)
+}
+
 /// Whether [`save`] could write `path` now: its ending, its folder, the file in its place. Ask before a render, not
 /// after it. Leaves nothing behind.
 ///

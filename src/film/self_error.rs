@@ -12,7 +12,8 @@
 //!
 //! k comes from the picture as well. Two runs of passes, an earlier and a later one, give in each half a difference that is
 //! pure noise, a and b; they are independent, so (a, b)^2 has the expectation tr(C_a C_b). Taken block by block, since
-//! errors far apart do not go together, this has as many degrees of freedom as there are blocks that count.
+//! errors far apart do not go together, this has as many degrees of freedom as there are blocks that count. How far is
+//! far differs, so blocks of three sizes are tried.
 
 use super::metrics::{BLOCK, Estimate, student_975};
 use super::{Film, Window};
@@ -34,6 +35,7 @@ pub struct SelfErrors {
 pub struct SelfError {
     earlier: Vec<State>,
     pixels: Option<Vec<usize>>,
+    last: Option<SelfErrors>,
 }
 
 /// Sums of radiance and passes of the two halves at one time.
@@ -79,7 +81,7 @@ impl SelfError {
 
     /// Of the pixels with these numbers, in row-major order of the film's window.
     pub fn of_pixels(pixels: Vec<usize>) -> Self {
-        Self { earlier: Vec::new(), pixels: Some(pixels) }
+        Self { pixels: Some(pixels), ..Self::default() }
     }
 
     /// The errors of `film` as it is now, which must be the film of the earlier calls with passes added, or a new one.
@@ -112,7 +114,13 @@ impl SelfError {
             self.pixels = Some(pixels);
         }
         self.keep(now);
+        self.last = Some(errors);
         Some(errors)
+    }
+
+    /// What [`Self::measure`] said last.
+    pub fn last(&self) -> Option<SelfErrors> {
+        self.last
     }
 
     /// Keeps the states at about a quarter and a half of the passes to come.
@@ -167,11 +175,25 @@ impl Together {
                 }
             }
         }
+        let mut worst = None;
+        let mut grid = [columns, products.len() / columns];
+        for _ in 0..LEVELS {
+            let at_level = Self::of_blocks(&products, &squares, runs);
+            if worst.is_none_or(|w: Self| at_level.independent < w.independent) {
+                worst = Some(at_level);
+            }
+            products = four_to_one(&products, &mut grid);
+        }
+        worst.filter(|_| runs > 0)
+    }
+
+    /// From the products of the noise of both halves in each block, and the squares of that noise.
+    fn of_blocks(products: &[[f64; KEPT * KEPT]], squares: &[[f64; KEPT]; 2], runs: usize) -> Self {
         let (mut second, mut fourth) = (0.0, 0.0);
         for r in 0..runs {
             for t in 0..runs {
                 let size = squares[0][r] * squares[1][t];
-                for block in &products {
+                for block in products {
                     let shared = block[r * KEPT + t].powi(2) / size;
                     second += shared;
                     fourth += shared * shared;
@@ -180,7 +202,7 @@ impl Together {
         }
         // For products p of normal errors E p^4 = 3 (E p^2)^2, and E (sum of p^2)^2 has twice the sum of (E p^2)^2 on top.
         let freedom = 3.0 * second * second / fourth - 2.0;
-        (runs > 0).then_some(Self { independent: (runs * runs) as f64 / second, freedom })
+        Self { independent: (runs * runs) as f64 / second, freedom }
     }
 
     /// Half of the 95 % interval of log(T / S); none without noise.
@@ -191,7 +213,24 @@ impl Together {
     }
 }
 
-/// Side of the blocks within which errors may go together [pixels]: smaller where the picture has few.
+/// Blocks of 1, 2 and 4 times the side are tried: noise of the cache may be as wide as that, and the widest counts.
+const LEVELS: usize = 3;
+
+/// Sums over 2x2 blocks; `grid` is columns and rows before and after.
+fn four_to_one(blocks: &[[f64; KEPT * KEPT]], grid: &mut [usize; 2]) -> Vec<[f64; KEPT * KEPT]> {
+    let columns = grid[0].div_ceil(2);
+    let mut out = vec![[0.0; KEPT * KEPT]; columns * grid[1].div_ceil(2)];
+    for (i, block) in blocks.iter().enumerate() {
+        let sum = &mut out[i / grid[0] / 2 * columns + i % grid[0] / 2];
+        for (sum, value) in sum.iter_mut().zip(block) {
+            *sum += value;
+        }
+    }
+    *grid = [columns, grid[1].div_ceil(2)];
+    out
+}
+
+/// Side of the smallest blocks within which errors may go together [pixels]: smaller where the picture has few.
 fn block_side(window: Window) -> usize {
     (((window.area() as f64).sqrt() / 8.0) as usize).clamp(4, BLOCK as usize)
 }

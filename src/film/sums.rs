@@ -4,6 +4,7 @@ use super::exact::{Exact, MOST, PLACES};
 use super::{Image, Window};
 use crate::math::Rgb;
 use crate::{Error, ErrorKind, Result, memory};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Write};
 use std::ops::Range;
@@ -88,10 +89,10 @@ impl Sums {
         for n in self.samples {
             write_whole(out, n.into())?;
         }
-        for k in 0..self.tops.len() {
-            out.write_all(&[self.tops[k]])?;
-            if self.tops[k] > 0 {
-                for digit in self.digits[k] {
+        for (top, digits) in self.tops.iter().zip(&self.digits) {
+            out.write_all(&[*top])?;
+            if *top > 0 {
+                for digit in digits {
                     write_whole(out, ((digit << 1) ^ (digit >> 63)) as u64)?;
                 }
             }
@@ -110,15 +111,13 @@ impl Sums {
             }
             *n = count as u32;
         }
-        for k in 0..sums.tops.len() {
-            let mut top = [0];
-            from.read_exact(&mut top)?;
-            if top[0] > PLACES {
+        for (top, digits) in sums.tops.iter_mut().zip(&mut sums.digits) {
+            from.read_exact(std::slice::from_mut(top))?;
+            if *top > PLACES {
                 return no("a sum is out of range");
             }
-            sums.tops[k] = top[0];
-            if top[0] > 0 {
-                for digit in &mut sums.digits[k] {
+            if *top > 0 {
+                for digit in digits {
                     let zigzag = read_whole(from)?;
                     *digit = (zigzag >> 1) as i64 ^ -((zigzag & 1) as i64);
                     if digit.unsigned_abs() > u64::from(passes) << 35 {
@@ -222,7 +221,8 @@ impl Film {
             Error::new(ErrorKind::Memory, format!("{what}, which the system refuses; {}", Self::REMEDY))
         })?;
         sums.resize(window.area(), Sums::default());
-        Ok(Self { resolution, window, sums, ranges: vec![0..0], counts: Counts::default() })
+        let none = 0..0;
+        Ok(Self { resolution, window, sums, ranges: vec![none], counts: Counts::default() })
     }
 
     const REMEDY: &str = "render a smaller picture, or parts of it by --crop";
@@ -241,7 +241,8 @@ impl Film {
     #[must_use]
     pub fn starting_at(mut self, pass: u32) -> Self {
         debug_assert_eq!(self.passes(), 0, "the film has passes already");
-        self.ranges = vec![pass..pass];
+        let none = pass..pass;
+        self.ranges = vec![none];
         self
     }
 
@@ -256,23 +257,42 @@ impl Film {
             return;
         }
         let pass = self.next_pass();
-        let half = (pass & 1) as usize;
         for (row, y) in samples.chunks_exact(window.width()).zip(window.y0..) {
             let start = self.window.index(window.x0, y);
-            for (i, (sums, sample)) in self.sums[start..].iter_mut().zip(row).enumerate() {
-                let this = BadSample { pass, pixel: [window.x0 + i as u32, y] };
-                if !sample.is_finite() {
-                    self.counts.non_finite += 1;
-                    self.counts.first_non_finite = first(self.counts.first_non_finite, Some(this));
-                    continue;
-                }
-                if sample.min() < 0.0 {
-                    self.counts.negative += 1;
-                    self.counts.first_negative = first(self.counts.first_negative, Some(this));
-                }
-                self.counts.samples += 1;
-                sums.add(half, sample);
+            self.counts.take(&add_row(&mut self.sums[start..], row, BadSample { pass, pixel: [window.x0, y] }));
+        }
+    }
+
+    /// [`Self::add`] for all tiles of a pass, on all cores. Tiles stand in rows from the top, those of a row with the same
+    /// upper and lower ends.
+    ///
+    /// # Panics
+    /// As [`Self::add`], and if a row of tiles does not lie below the one before it.
+    pub fn add_pass(&mut self, tiles: &[(Window, Vec<Rgb>)]) {
+        let (pass, film, width) = (self.next_pass(), self.window, self.window.width());
+        let (mut rest, mut row) = (&mut self.sums[..], film.y0);
+        for band in tiles.chunk_by(|a, b| a.0.y0 == b.0.y0) {
+            let Window { y0, y1, .. } = band[0].0;
+            for (tile, samples) in band {
+                assert!(film.contains(*tile) && (tile.y1, samples.len()) == (y1, tile.area()), "tile {tile}");
             }
+            let (rows, below) = rest[(y0 - row) as usize * width..].split_at_mut((y1 - y0) as usize * width);
+            let add = |(i, sums): (usize, &mut [Sums])| {
+                let (mut counts, y) = (Counts::default(), y0 + i as u32);
+                for (tile, samples) in band {
+                    let from = &mut sums[(tile.x0 - film.x0) as usize..];
+                    let samples = &samples[i * tile.width()..(i + 1) * tile.width()];
+                    counts.take(&add_row(from, samples, BadSample { pass, pixel: [tile.x0, y] }));
+                }
+                counts
+            };
+            let sum = |mut a: Counts, b: Counts| {
+                a.take(&b);
+                a
+            };
+            let counts = rows.par_chunks_mut(width).enumerate().map(add).reduce(Counts::default, sum);
+            self.counts.take(&counts);
+            (rest, row) = (below, y1);
         }
     }
 
@@ -336,12 +356,7 @@ impl Film {
         for (sums, more) in self.sums.iter_mut().zip(&other.sums) {
             sums.join(more);
         }
-        let (a, b) = (&mut self.counts, &other.counts);
-        for (a, b) in [(&mut a.samples, b.samples), (&mut a.non_finite, b.non_finite), (&mut a.negative, b.negative)] {
-            *a = a.saturating_add(b);
-        }
-        a.first_non_finite = first(a.first_non_finite, b.first_non_finite);
-        a.first_negative = first(a.first_negative, b.first_negative);
+        self.counts.take(&other.counts);
         Ok(())
     }
 
@@ -433,6 +448,39 @@ impl Film {
 /// `sum` / `samples`, black without a sample.
 fn mean(sum: [f64; 3], samples: f64) -> Rgb {
     if samples > 0.0 { Rgb::from_fn(|c| (sum[c] / samples) as f32) } else { Rgb::BLACK }
+}
+
+/// Adds samples of neighbouring pixels to their sums; `at` is the first of them.
+fn add_row(sums: &mut [Sums], samples: &[Rgb], at: BadSample) -> Counts {
+    let (mut counts, half) = (Counts::default(), (at.pass & 1) as usize);
+    for (i, (sums, sample)) in sums.iter_mut().zip(samples).enumerate() {
+        let this = BadSample { pixel: [at.pixel[0] + i as u32, at.pixel[1]], ..at };
+        if !sample.is_finite() {
+            counts.non_finite += 1;
+            counts.first_non_finite = counts.first_non_finite.or(Some(this));
+            continue;
+        }
+        if sample.min() < 0.0 {
+            counts.negative += 1;
+            counts.first_negative = counts.first_negative.or(Some(this));
+        }
+        counts.samples += 1;
+        sums.add(half, sample);
+    }
+    counts
+}
+
+impl Counts {
+    /// Adds those of another part.
+    fn take(&mut self, b: &Self) {
+        let sums =
+            [(&mut self.samples, b.samples), (&mut self.non_finite, b.non_finite), (&mut self.negative, b.negative)];
+        for (a, b) in sums {
+            *a = a.saturating_add(b);
+        }
+        self.first_non_finite = first(self.first_non_finite, b.first_non_finite);
+        self.first_negative = first(self.first_negative, b.first_negative);
+    }
 }
 
 /// The earlier of two by pass, row, column.

@@ -163,7 +163,7 @@ impl Subsurface {
             };
             let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
             let filler = self.filler(view, object, body, &stream, &even);
-            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread);
+            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread, self.options.cache_samples);
             Plan { survey, near: self.near(body) }
         };
         self.bodies.iter().zip(points).enumerate().map(plan).collect()

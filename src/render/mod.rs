@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::film::{Film, Window};
 use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
-use crate::sampling::{PixelStream, Turn};
+use crate::sampling::{Pairs, PixelStream, Turn};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -184,12 +184,18 @@ fn render_pass<I: Integrator>(
         })
         .collect();
     outcome.seconds.cache += (filled - start).as_secs_f64();
-    outcome.seconds.gather += filled.elapsed().as_secs_f64();
-    let Some(rendered) = rendered.into_iter().collect::<Option<Vec<_>>>() else { return false };
-    for (&tile, (samples, work)) in tiles.iter().zip(rendered) {
-        film.add(tile, &samples);
-        tally += work;
+    let rendered = rendered.into_iter().collect::<Option<Vec<_>>>();
+    if let Some(rendered) = rendered {
+        let add = |(&tile, (samples, work))| {
+            tally += work;
+            (tile, samples)
+        };
+        film.add_pass(&tiles.iter().zip(rendered).map(add).collect::<Vec<_>>());
+    } else {
+        outcome.seconds.gather += filled.elapsed().as_secs_f64();
+        return false;
     }
+    outcome.seconds.gather += filled.elapsed().as_secs_f64();
     outcome.tally += tally;
     film.end_pass();
     true
@@ -226,13 +232,20 @@ fn render_tile<I: Integrator>(
     let turn = Turn::of(job.seed, pass);
     let whole = if integrator.shares_tiles() { whole_tile(tile, camera.resolution) } else { tile };
     let pixels = pixels(whole);
-    let rays: Vec<CameraRay> = pixels
+    let mut places = Pairs::with_capacity(pixels.len());
+    let streams: Vec<PixelStream> = pixels
         .iter()
         .map(|&[x, y]| {
             let mut stream = PixelStream::new(turn.seed, u64::from(y) * width + u64::from(x), turn.number);
-            let ray = camera.ray([x, y], stream.next_2d());
-            CameraRay { ray, stream }
+            places.push(&mut stream);
+            stream
         })
+        .collect();
+    let rays: Vec<CameraRay> = pixels
+        .iter()
+        .zip(places.numbers())
+        .zip(streams)
+        .map(|((&pixel, place), stream)| CameraRay { ray: camera.ray(pixel, place), stream })
         .collect();
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);

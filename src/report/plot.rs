@@ -1,11 +1,14 @@
 //! Scientific plots as SVG, written by hand: panels in a grid, linear or logarithmic axes, lines and measured points.
 //! The files open in a browser and need nothing else.
 
+use super::page::escape;
 use std::fmt::Write as _;
 
 /// A whole picture.
 #[derive(Clone, Debug, Default)]
 pub struct Figure {
+    /// Width of the whole in pixels; 1180 if absent.
+    pub width: Option<f64>,
     /// First line.
     pub title: String,
     /// Smaller second line.
@@ -74,6 +77,11 @@ pub enum Stroke {
         /// SVG `stroke-dasharray`.
         dash: &'static str,
     },
+    /// The area between two curves, half transparent.
+    Band {
+        /// CSS colour.
+        colour: &'static str,
+    },
     /// Circles with error bars.
     Points {
         /// CSS colour.
@@ -86,7 +94,7 @@ pub enum Stroke {
 pub struct Series {
     /// Look.
     pub stroke: Stroke,
-    /// (x, y, standard error of y); points that are not finite, or not positive on a logarithmic axis, break the line.
+    /// (x, y, standard error of y), for a band (x, lower y, upper y); points that are not finite, or not positive on a logarithmic axis, break the line.
     pub points: Vec<(f64, f64, f64)>,
 }
 
@@ -145,6 +153,23 @@ impl Axis {
                         );
                     }
                 }
+                // Few decades: the numbers between them are needed to read anything off.
+                if major.len() < 3 {
+                    for decade in first - 1..=last {
+                        for k in [2, 5] {
+                            let value = f64::from(k) * 10f64.powi(decade);
+                            if (self.min..=self.max).contains(&value) {
+                                let label = if plain {
+                                    plain_number(value)
+                                } else {
+                                    format!("{k}·{}", power_of_ten(decade, false))
+                                };
+                                major.push((value, label));
+                            }
+                        }
+                    }
+                    minor.retain(|v| major.iter().all(|(m, _)| (v / m - 1.0).abs() > 1e-9));
+                }
                 (major, minor)
             }
         }
@@ -155,6 +180,12 @@ impl Axis {
 fn nice_step(rough: f64) -> f64 {
     let power = 10f64.powf(rough.log10().floor());
     [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * power).find(|&step| step >= rough * 0.999).unwrap_or(10.0 * power)
+}
+
+/// Without the digits that rounding adds.
+fn plain_number(value: f64) -> String {
+    let text = format!("{value:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// The number itself, or 10 with a raised exponent.
@@ -176,14 +207,11 @@ fn power_of_ten(decade: i32, plain: bool) -> String {
     }
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 impl Figure {
     /// The picture as an SVG document.
     pub fn to_svg(&self) -> String {
         let mut out = String::new();
+        let full = self.width.unwrap_or(WIDTH);
         let mut y = 34.0;
         let mut body = String::new();
         text(&mut body, (MARGIN_LEFT, y), 18.0, "start", "font-weight=\"bold\"", &self.title);
@@ -195,7 +223,7 @@ impl Figure {
             let titled = row.panels.iter().any(|p| !p.title.is_empty());
             y += if titled { 34.0 } else { GAP_Y };
             let n = row.panels.len().max(1) as f64;
-            let width = (WIDTH - MARGIN_LEFT - MARGIN_RIGHT - GAP_X * (n - 1.0)) / n;
+            let width = (full - MARGIN_LEFT - MARGIN_RIGHT - GAP_X * (n - 1.0)) / n;
             for (k, panel) in row.panels.iter().enumerate() {
                 let frame = Frame { x: MARGIN_LEFT + k as f64 * (width + GAP_X), y, width, height: row.height };
                 let same_y = k > 0 && row.panels[k - 1].y.label == panel.y.label;
@@ -212,7 +240,7 @@ impl Figure {
         let height = y + 18.0;
         let _ = write!(
             out,
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height:.0}\" viewBox=\"0 0 {WIDTH} {height:.0}\" {FONT}>\n\
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{full}\" height=\"{height:.0}\" viewBox=\"0 0 {full} {height:.0}\" {FONT}>\n\
              <title>{}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n{body}</svg>\n",
             escape(&self.title)
         );
@@ -227,7 +255,7 @@ impl Figure {
         }
         for (stroke, label) in &self.legend {
             let width = 58.0 + 7.2 * label.chars().count() as f64;
-            if x + width > WIDTH - MARGIN_RIGHT && x > MARGIN_LEFT {
+            if x + width > self.width.unwrap_or(WIDTH) - MARGIN_RIGHT && x > MARGIN_LEFT {
                 x = MARGIN_LEFT;
                 y += 21.0;
             }
@@ -237,6 +265,13 @@ impl Figure {
                         body,
                         "<path d=\"M{x:.1} {:.1}h34\" stroke=\"{colour}\" stroke-width=\"2.2\" stroke-dasharray=\"{dash}\"/>",
                         y - 4.5
+                    );
+                }
+                Stroke::Band { colour } => {
+                    let _ = writeln!(
+                        body,
+                        "<rect x=\"{x:.1}\" y=\"{:.1}\" width=\"34\" height=\"9\" fill=\"{colour}\" fill-opacity=\"0.18\"/>",
+                        y - 9.0
                     );
                 }
                 Stroke::Points { colour } => {
@@ -345,6 +380,16 @@ impl Series {
                     body,
                     "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dash}\" stroke-linejoin=\"round\"/>"
                 );
+            }
+            Stroke::Band { colour } => {
+                let ends = self.points.iter().filter_map(|&(x, low, high)| Some((px(x)?, py(low)?, py(high)?)));
+                let ends: Vec<(f64, f64, f64)> = ends.collect();
+                let upper = ends.iter().map(|&(x, _, high)| (x, high));
+                let lower = ends.iter().rev().map(|&(x, low, _)| (x, low));
+                let path: Vec<String> =
+                    upper.chain(lower).map(|(x, y)| format!("{x:.1},{:.1}", y.clamp(-1e4, 1e4))).collect();
+                let _ =
+                    writeln!(body, "<polygon points=\"{}\" fill=\"{colour}\" fill-opacity=\"0.18\"/>", path.join(" "));
             }
             Stroke::Points { colour } => {
                 let mut bars = String::new();

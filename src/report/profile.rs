@@ -202,7 +202,7 @@ impl Profile {
         let title = format!("{}: radial profile", self.title);
         let g = self.medium.g;
         let subtitle = format!("η = {}, g = {}", self.medium.eta, g);
-        Figure { title, subtitle, rows, legend, footnotes }.to_svg()
+        Figure { width: None, title, subtitle, rows, legend, footnotes }.to_svg()
     }
 
     fn panel_title(&self, c: usize) -> String {

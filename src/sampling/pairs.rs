@@ -19,12 +19,30 @@ impl Pairs {
         Self { index: Vec::with_capacity(count), seed: Vec::with_capacity(count) }
     }
 
+    /// Adds the first pair of a new stream, which goes on behind it.
+    pub fn push(&mut self, stream: &mut PixelStream) {
+        let (index, seed) = stream.take_place();
+        self.index.push(index);
+        self.seed.push(seed);
+    }
+
     /// Adds the first pair of every part of [`PixelStream::split`] into `parts`, in order.
     pub fn push_splits(&mut self, stream: &PixelStream, parts: u32) {
         for (index, seed) in stream.split_places(parts) {
             self.index.push(index);
             self.seed.push(seed);
         }
+    }
+
+    /// The pairs themselves, in [0, 1).
+    pub fn numbers(&self) -> Vec<[f32; 2]> {
+        self.numbers_at(Level::best())
+    }
+
+    fn numbers_at(&self, level: Level) -> Vec<[f32; 2]> {
+        let mut out = vec![[0.0; 2]; self.index.len()];
+        dispatch_at(level, Numbers { index: &self.index, seed: &self.seed, out: &mut out });
+        out
     }
 
     /// A unit direction of density cosθ/π about z for each pair, z above 0.
@@ -36,6 +54,23 @@ impl Pairs {
         let mut out = vec![Vec3::ZERO; self.index.len()];
         dispatch_at(level, Directions { index: &self.index, seed: &self.seed, out: &mut out });
         out
+    }
+}
+
+struct Numbers<'a> {
+    index: &'a [u32],
+    seed: &'a [u32],
+    out: &'a mut [[f32; 2]],
+}
+
+impl Kernel for Numbers<'_> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        for ((index, seed), out) in self.index.iter().zip(self.seed).zip(self.out) {
+            *out = pair(*index, *seed);
+        }
     }
 }
 
@@ -103,7 +138,18 @@ mod tests {
             pairs.push_splits(&stream, parts);
             expected.extend((0..parts).map(|part| cosine_hemisphere(n, stream.split(part, parts).next_2d())));
         }
+        let mut first = Pairs::default();
+        let alone: Vec<[f32; 2]> = (0..100)
+            .map(|pixel| {
+                let mut stream = PixelStream::new(9, pixel, 3);
+                let (mut pushed, pair) = (stream, stream.next_2d());
+                first.push(&mut pushed);
+                assert_eq!(pushed.next_2d(), stream.next_2d());
+                pair
+            })
+            .collect();
         for level in Level::available() {
+            assert_eq!(first.numbers_at(level), alone, "{level:?}");
             let got = pairs.cosine_hemisphere_at(level);
             assert_eq!(got.len(), expected.len());
             for (local, expected) in got.into_iter().zip(&expected) {

@@ -57,6 +57,13 @@ impl PixelStream {
         Self { key, index: (index % u64::from(SEQUENCE_LENGTH)) as u32, dimension: 0 }
     }
 
+    /// Index and scramble of the first dimensions of a stream of which none was used; the first two are then.
+    pub(super) fn take_place(&mut self) -> (u32, u32) {
+        debug_assert_eq!(self.dimension, 0);
+        self.dimension = 2;
+        (self.index, self.set_seed(0))
+    }
+
     /// Index and scramble of the first dimensions of every part, as [`Self::split`] has them.
     pub(super) fn split_places(&self, parts: u32) -> impl Iterator<Item = (u32, u32)> {
         let first = u64::from(self.index) * u64::from(parts);

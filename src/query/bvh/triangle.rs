@@ -294,19 +294,23 @@ mod tests {
 
     const RIGHT: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
-    struct Meet<'a>(&'a Pack, Ray);
+    struct Meet<'a>(&'a Pack, Ray, f32);
 
     impl LaneKernel for Meet<'_> {
         type Out = Option<LaneHit>;
         #[inline(always)]
         fn run<S: Simd>(self, simd: S) -> Self::Out {
-            let Self(pack, ray) = self;
-            pack.meet(&TriangleRay::new(simd, &ray), ray.t_min, ray.t_max).and_then(|met| met.nearest())
+            let Self(pack, ray, enters) = self;
+            pack.meet(&TriangleRay::new(simd, &ray), enters, ray.t_max).and_then(|met| met.nearest())
         }
     }
 
     fn nearest(pack: &Pack, ray: Ray) -> Option<LaneHit> {
-        let hits: Vec<_> = Level::available().into_iter().map(|l| Lanes::at(l).run(Meet(pack, ray))).collect();
+        nearest_beyond(pack, ray, ray.t_min)
+    }
+
+    fn nearest_beyond(pack: &Pack, ray: Ray, enters: f32) -> Option<LaneHit> {
+        let hits: Vec<_> = Level::available().into_iter().map(|l| Lanes::at(l).run(Meet(pack, ray, enters))).collect();
         assert!(hits.iter().all(|&h| h == hits[0]), "{hits:?}");
         hits[0]
     }
@@ -336,6 +340,17 @@ mod tests {
         assert_eq!(t(0.0, f32::INFINITY), Some((1.0, 1)));
         assert_eq!(t(1.0, f32::INFINITY), Some((2.0, 2)));
         assert_eq!(t(2.0, 3.0), None);
+    }
+
+    #[test]
+    fn no_triangle_is_nearer_than_its_box() {
+        let pack = Pack::new(&[RIGHT]);
+        // Inside, and on an edge, where f64 decides.
+        for x in [0.25, 0.0] {
+            let ray = Ray { t_max: 3.0, ..Ray::new(Vec3::new(x, 0.25, -1.0), Vec3::Z) };
+            let t = |enters| nearest_beyond(&pack, ray, enters).map(|h| h.t);
+            assert_eq!([t(0.5), t(1.25), t(3.0)], [Some(1.0), Some(1.25), None]);
+        }
     }
 
     #[test]

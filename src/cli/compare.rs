@@ -1,0 +1,193 @@
+//! `marmor compare`: models against a reference on one scene, and where they differ. Reads in the order it runs.
+
+use super::converge::{file_name, scene_name};
+use super::keep::cancel_on_signals;
+use super::race::{Entrant, Runner, command, machine, race};
+use super::render::duration;
+use super::setup::MethodArgs;
+use marmor::film::{Image, Metadata, PngOptions, metrics, png_bytes, save, write_atomically};
+use marmor::math::Rgb;
+use marmor::report::{Compared, ModelComparison, Picture, common_range, false_colours};
+use marmor::scene::MethodName;
+use marmor::{Error, Result};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Duration;
+
+#[derive(clap::Args)]
+#[command(after_help = "\
+A model is one or more words joined by `+`, as for `marmor converge --methods`: standard, beam+notes, directional ...
+Writes for each model NAME.exr and NAME.png, NAME_difference.exr (signed), NAME_relative.exr and NAME_relative.png
+(false colours), then compare.csv and one page, index.html.")]
+pub struct Args {
+    /// The scene file
+    scene: PathBuf,
+    /// Models to compare, separated by commas
+    #[arg(long, value_name = "A,B,C", value_delimiter = ',', required = true)]
+    models: Vec<String>,
+    /// What the models are held against, in the words of a model [default: volume_path]
+    #[arg(long, value_name = "METHOD", conflicts_with = "reference")]
+    truth: Option<String>,
+    /// Hold the models against this EXR instead
+    #[arg(long, value_name = "EXR")]
+    reference: Option<PathBuf>,
+    /// Time of rendering for each model, such as 20s
+    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "20s")]
+    time_budget: Duration,
+    /// Time of rendering for the reference [default: three times the budget of a model]
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    reference_budget: Option<Duration>,
+    /// Folder for the results; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    #[command(flatten)]
+    method: MethodArgs,
+    /// Threads [default: one for each core]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    quiet: bool,
+}
+
+/// Runs the command.
+pub fn run(args: Args) -> Result<ExitCode> {
+    std::fs::create_dir_all(&args.output).map_err(|e| Error::file(&args.output, "make the folder", e))?;
+    let mut builder = rayon::ThreadPoolBuilder::new();
+    if let Some(threads) = args.threads {
+        builder = builder.num_threads(threads.max(1));
+    }
+    let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;
+    pool.install(|| compare(&args))
+}
+
+/// A picture with the relMSE of its noise.
+struct Truth {
+    text: String,
+    image: Image,
+    noise: f64,
+}
+
+fn compare(args: &Args) -> Result<ExitCode> {
+    let say = |text: &str| {
+        if !args.quiet {
+            eprintln!("{text}");
+        }
+    };
+    let entrants = args
+        .models
+        .iter()
+        .map(|spec| Entrant::new(spec, &args.scene, &args.method.variant(spec)?))
+        .collect::<Result<Vec<_>>>()?;
+    let mut runners = entrants.iter().map(Runner::new).collect::<Result<Vec<_>>>()?;
+    let cancel = cancel_on_signals();
+    let budget = args.time_budget.as_secs_f64();
+    let reference_budget = args.reference_budget.map_or(3.0 * budget, |t| t.as_secs_f64());
+    let truth = match &args.reference {
+        Some(path) => Truth { text: path.display().to_string(), image: Image::read_exr(path)?, noise: 0.0 },
+        None => {
+            let spec = args.truth.as_deref().unwrap_or(MethodName::VolumePath.name());
+            say(&format!("reference {spec}: {reference_budget:.0} s"));
+            let seed = args.method.seed().unwrap_or(0) ^ 0x7472_7574;
+            let entrant = Entrant::new(spec, &args.scene, &args.method.variant(spec)?.seeded(seed))?;
+            let mut runner = [Runner::new(&entrant)?];
+            race(&mut runner, reference_budget, &cancel, |_, r| r.follow())?;
+            let [runner] = runner;
+            let noise = runner.own.last().and_then(|e| e.relmse).map_or(0.0, |e| e.value);
+            Truth { text: spec.to_owned(), image: runner.film.image(), noise }
+        }
+    };
+    say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
+    let whole = race(&mut runners, budget, &cancel, |_, runner| runner.follow())?;
+    let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
+    let footnotes = vec![format!("Machine: {}.", machine()), format!("Command: {}", command())];
+    let report = write(args, &mut runners, &truth, exposure, footnotes)?;
+    for sentence in report.sentences() {
+        say(&sentence);
+    }
+    say(&format!("wrote {}", args.output.join("index.html").display()));
+    Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) })
+}
+
+/// Longest side of a picture on the page [pixels].
+const SHOWN: u32 = 320;
+
+fn write(
+    args: &Args,
+    runners: &mut [Runner<'_>],
+    truth: &Truth,
+    exposure: f64,
+    footnotes: Vec<String>,
+) -> Result<ModelComparison> {
+    let folder = &args.output;
+    let picture = |image: &Image, caption: &str, note: String, exposure: f64| -> Result<Picture> {
+        let png = png_bytes(&image.shrunk(SHOWN), exposure)?;
+        Ok(Picture { png, caption: caption.into(), note, pixelated: false })
+    };
+    save_both(folder, "reference", &truth.image, exposure)?;
+    let mut pictures = vec![picture(&truth.image, &truth.text, "reference".into(), exposure)?];
+    let (mut models, mut relatives) = (Vec::new(), Vec::new());
+    for runner in runners.iter_mut() {
+        let (image, name) = (runner.film.image(), &runner.entrant.name);
+        let file = file_name(name);
+        let comparison = metrics::compare(&image, &truth.image, None)?;
+        let point = runner.measure(&truth.image)?;
+        let [signed, relative] = differences(&image, &truth.image);
+        save_both(folder, &file, &image, exposure)?;
+        for (suffix, image) in [("difference", &signed), ("relative", &relative)] {
+            let path = folder.join(format!("{file}_{suffix}.exr"));
+            save(image, &path, &Metadata::default(), PngOptions::default())?;
+        }
+        let note = format!("{} samples, {:.1} s", runner.film.passes(), runner.seconds.total());
+        pictures.push(picture(&image, name, note, exposure)?);
+        relatives.push((name.clone(), file, relative));
+        models.push(Compared {
+            name: name.clone(),
+            seconds: runner.seconds.total(),
+            samples: runner.film.passes(),
+            mean_ratio: comparison.mean_ratio,
+            measured: comparison.whole.relmse.map_or(0.0, |e| e.value),
+            noise: point.map_or(0.0, |p| p.own),
+            width: point.and_then(|p| p.width),
+        });
+    }
+    let range = common_range(relatives.iter().map(|(_, _, image)| image));
+    let mut shown = Vec::new();
+    for (name, file, relative) in &relatives {
+        let colours = false_colours(relative, range);
+        save(&colours, &folder.join(format!("{file}_relative.png")), &Metadata::default(), PngOptions::default())?;
+        // Shrunk before it is coloured: colours do not average.
+        shown.push(picture(&false_colours(&relative.shrunk(SHOWN), range), name, String::new(), 0.0)?);
+    }
+    let report = ModelComparison {
+        scene: scene_name(&args.scene),
+        reference: truth.text.clone(),
+        reference_noise: truth.noise,
+        models,
+        range,
+        footnotes,
+    };
+    let put = |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
+    put("compare.csv", &report.to_csv())?;
+    put("index.html", &report.page(&pictures, &shown).to_html())?;
+    Ok(report)
+}
+
+fn save_both(folder: &Path, name: &str, image: &Image, exposure: f64) -> Result<()> {
+    for ending in ["exr", "png"] {
+        save(image, &folder.join(format!("{name}.{ending}")), &Metadata::default(), PngOptions { exposure })?;
+    }
+    Ok(())
+}
+
+/// x - r, and (x - r) / sqrt(r^2 + 0.01 mean(r)^2).
+fn differences(x: &Image, r: &Image) -> [Image; 2] {
+    let sum: f64 = r.pixels.iter().flat_map(|p| p.0).map(f64::from).sum();
+    let floor = (0.1 * sum / (3 * r.pixels.len()) as f64) as f32;
+    let of = |f: &dyn Fn(f32, f32) -> f32| Image {
+        pixels: x.pixels.iter().zip(&r.pixels).map(|(x, r)| Rgb::from_fn(|c| f(x[c], r[c]))).collect(),
+        ..Image { resolution: r.resolution, window: r.window, pixels: Vec::new() }
+    };
+    let relative = |x: f32, r: f32| if floor > 0.0 { (x - r) / r.hypot(floor) } else { 0.0 };
+    [of(&|x, r| x - r), of(&relative)]
+}

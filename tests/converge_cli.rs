@@ -1,0 +1,153 @@
+//! `marmor converge` as a user calls it: files, page, messages.
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+const SCENE: &str = r#"
+unit = "mm"
+[camera]
+position = [0, 2, 6]
+look_at = [0, 0, 0]
+fov = 30
+resolution = [24, 16]
+[[object]]
+name = "ball"
+shape = "sphere"
+centre = [0, 0, 0]
+radius = 1
+rings = 16
+segments = 32
+material = "wax"
+[[object]]
+name = "lamp"
+shape = "rectangle"
+centre = [0, 5, 0]
+edge_u = [2, 0, 0]
+edge_v = [0, 0, 2]
+material = "lamp"
+[material.wax]
+type = "translucent"
+sigma_s_prime = [2, 3, 4]
+sigma_a = [0.05, 0.1, 0.2]
+eta = 1.3
+[material.lamp]
+type = "emissive"
+radiance = 5
+[environment]
+radiance = 1
+[method]
+cache_samples = 200
+"#;
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    folder
+}
+
+fn marmor(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_marmor")).current_dir(folder).args(arguments).output().unwrap()
+}
+
+#[test]
+fn a_report_has_its_page_plots_table_and_records() {
+    let folder = folder();
+    let arguments =
+        ["converge", "scene.toml", "--methods", "all,notes+100,all+standard", "--time-budget", "150ms", "-o", "out"];
+    let output = marmor(folder.path(), &arguments);
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    assert!(told.contains("has the smallest error") && told.contains("index.html"), "{told}");
+    let out = folder.path().join("out");
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(page.len() < 2_000_000, "{}", page.len());
+    for part in ["notes+100", "<svg", "data:image/png;base64,", "marmor converge scene.toml", "threads", "reference"] {
+        assert!(page.contains(part), "`{part}`");
+    }
+    for remote in ["src=\"http", "href=", "<script", "@import"] {
+        assert!(!page.contains(remote), "the page fetches nothing: {remote}");
+    }
+    for svg in ["error_seconds.svg", "error_samples.svg"] {
+        let svg = fs::read_to_string(out.join(svg)).unwrap();
+        assert!(svg.starts_with("<svg") && !svg.contains("NaN") && !svg.contains("inf"));
+    }
+    let csv = fs::read_to_string(out.join("converge.csv")).unwrap();
+    let columns = csv.lines().nth(1).unwrap().split(',').count();
+    assert!(csv.lines().skip(2).all(|l| l.split(',').count() == columns), "{csv}");
+    for method in ["all", "notes+100", "all+standard"] {
+        assert!(csv.lines().any(|l| l.starts_with(&format!("{method},"))), "{method}");
+        let records = fs::read_to_string(out.join(format!("{method}.jsonl"))).unwrap();
+        let last: serde_json::Value = serde_json::from_str(records.lines().last().unwrap()).unwrap();
+        assert!(last["relmse"].as_f64().unwrap() > 0.0 && last["self_relmse"].as_f64().unwrap() > 0.0);
+    }
+}
+
+#[test]
+fn a_reference_may_be_given() {
+    let folder = folder();
+    assert!(marmor(folder.path(), &["render", "scene.toml", "-q", "-o", "r.exr", "--spp", "64"]).status.success());
+    let output = marmor(
+        folder.path(),
+        &[
+            "converge",
+            "scene.toml",
+            "--methods",
+            "all",
+            "--reference",
+            "r.exr",
+            "--time-budget",
+            "50ms",
+            "-o",
+            "o",
+            "-q",
+        ],
+    );
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(output.stderr.is_empty());
+    assert!(fs::read_to_string(folder.path().join("o/index.html")).unwrap().contains("r.exr, taken as exact"));
+}
+
+#[test]
+fn a_wrong_method_is_named_with_the_nearest_one() {
+    let folder = folder();
+    for (methods, part) in
+        [("cut,notse", "did you mean `notes`"), ("cut+as_notes", "as_notes has its own"), ("cut_eror=0.1", "cut_error")]
+    {
+        let output = marmor(folder.path(), &["converge", "scene.toml", "--methods", methods, "-o", "out"]);
+        let told = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && told.contains(part), "{methods}: {told}");
+    }
+}
+
+#[test]
+fn an_error_to_reach_ends_a_render() {
+    let folder = folder();
+    let output = marmor(
+        folder.path(),
+        &["render", "scene.toml", "-o", "x.exr", "--target-error", "2e-3", "--records", "r.jsonl", "--spp", "4000"],
+    );
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && told.contains("reached --target-error"), "{told}");
+    let records = fs::read_to_string(folder.path().join("r.jsonl")).unwrap();
+    let figures: Vec<f64> = records
+        .lines()
+        .map(|l| serde_json::from_str::<serde_json::Value>(l).unwrap()["self_relmse"].as_f64().unwrap_or(f64::MAX))
+        .collect();
+    let (last, before) = figures.split_last().unwrap();
+    assert!(*last <= 2e-3 && before.iter().skip(8).all(|v| *v > 2e-3), "{figures:?}");
+    assert!(told.contains("estimated relMSE"));
+}
+
+#[test]
+fn variance_is_a_layer_of_the_exr() {
+    let folder = folder();
+    let arguments = ["render", "scene.toml", "-q", "-o", "x.exr", "--layers", "variance", "--spp", "16"];
+    assert!(marmor(folder.path(), &arguments).status.success());
+    let layer = marmor::film::Image::read_exr_layer(&folder.path().join("x.exr"), Some("Variance")).unwrap();
+    assert!(layer.pixels.iter().all(|p| p.min() >= 0.0) && layer.pixels.iter().any(|p| p[0] > 0.0));
+    let one = marmor(folder.path(), &["render", "scene.toml", "-o", "x.exr", "--layers", "variance", "--spp", "1"]);
+    assert!(String::from_utf8_lossy(&one.stderr).contains("at least 2 samples"));
+}
