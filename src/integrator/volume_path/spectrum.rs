@@ -168,12 +168,12 @@ mod tests {
                 }
             }
         }
-        for (c, passed) in passed.iter().enumerate() {
+        for (c, sums) in passed.into_iter().enumerate() {
             // Two collisions in a length of 1: (σ_s)²/2 exp(-σ_t).
             let (s, t) = (f64::from(medium.albedo[c] * medium.sigma_t[c]), f64::from(medium.sigma_t[c]));
             let expected = 0.5 * s * s * (-t).exp();
-            let mean = passed[0] / n as f64;
-            let error = ((passed[1] / n as f64 - mean * mean) / n as f64).sqrt();
+            let mean = sums[0] / n as f64;
+            let error = ((sums[1] / n as f64 - mean * mean) / n as f64).sqrt();
             assert!(((mean - expected) / error).abs() < 6.0, "{c}: {mean} +- {error}, expected {expected}");
         }
     }
