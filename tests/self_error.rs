@@ -81,7 +81,7 @@ impl Observer for Follow {
 }
 
 fn render<I: Integrator>(integrator: &I, scene: &Scene, passes: u32, seed: u64, follow: bool) -> Rendered {
-    let rays = query::build(Backend::Bvh, &scene.meshes()).unwrap();
+    let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
     let resolution = scene.camera.resolution;
     let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
     let cancel = AtomicBool::new(false);
