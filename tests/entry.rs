@@ -59,14 +59,17 @@ impl Set {
     }
 }
 
+/// Enough to see a weight of the cosine that is a third off.
+const FLUX_SAMPLES: u32 = 40_000;
+
 /// Mean and standard error of the flux of each of some independent caches.
 fn flux(set: &Set, density: &Density, cosine_share: f32) -> [f64; 2] {
     let caches = 40;
     let each: Vec<f64> = (0..caches)
         .map(|seed| {
             let stream = CacheStream::new(Points::Independent, seed, 0);
-            let cache = set.filler(&stream, density, cosine_share).fill(0, 2000, &mut RayTally::default());
-            cache.lit.iter().map(|s| f64::from(s.flux.mean())).sum::<f64>() / 2000.0
+            let cache = set.filler(&stream, density, cosine_share).fill(0, FLUX_SAMPLES, &mut RayTally::default());
+            cache.lit.iter().map(|s| f64::from(s.flux.mean())).sum::<f64>() / f64::from(FLUX_SAMPLES)
         })
         .collect();
     let n = caches as f64;
