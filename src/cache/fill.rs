@@ -110,7 +110,7 @@ impl Filler<'_> {
     }
 
     /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
-    /// and some by the cosine, each counts over the density of both [Vea97], the balance heuristic.
+    /// and some by the cosine or the environment, each counts over the density of both [Vea97], the balance heuristic.
     fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut RayTally) -> Option<(Arrival, bool)> {
         let share = self.cosine_share;
         if !self.lights.has_emitters() {
@@ -122,17 +122,17 @@ impl Filler<'_> {
         }
         if u[3] >= share {
             let mut arrival = self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]])?;
-            arrival.irradiance *= 1.0 / ((1.0 - share) + share * at.n.dot(arrival.w) / PI / arrival.pdf_angle);
+            arrival.irradiance *=
+                1.0 / ((1.0 - share) + share * self.lights.pdf_around(at, arrival.w) / arrival.pdf_angle);
             return Some((arrival, false));
         }
-        let (w, ray) = Lights::look_up(at, [u[1], u[2]])?;
-        let cosine = at.n.dot(w) / PI;
+        let (w, ray) = self.lights.look_around(at, [u[1], u[2]])?;
         tally.bounce += 1;
         let (radiance, by_light) = match self.rays.closest(&ray) {
             Some(hit) => (emitted(self.scene, &hit, w), self.lights.pdf_angle(self.scene, &hit, w)),
-            None => (self.lights.environment(), 0.0),
+            None => (self.lights.environment(w), 0.0),
         };
-        let pdf_angle = share * cosine + (1.0 - share) * by_light;
+        let pdf_angle = share * self.lights.pdf_around(at, w) + (1.0 - share) * by_light;
         let irradiance = radiance * (at.n.dot(w) / pdf_angle);
         Some((Arrival { w, irradiance, pdf_angle, shadow: ray }, true))
     }
@@ -146,7 +146,7 @@ impl Filler<'_> {
             tally.bounce += 1;
             let radiance = match self.rays.closest(&ray) {
                 Some(hit) => emitted(self.scene, &hit, w),
-                None => self.lights.environment(),
+                None => self.lights.environment(w),
             };
             if !radiance.is_black() {
                 lit.extend(self.transmitted(

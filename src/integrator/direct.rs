@@ -55,7 +55,7 @@ impl Integrator for Direct {
         let hits = view.camera_hits(rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
-                None => self.light.lights.environment(),
+                None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) => {
                     let at = view.point(hit, ray.ray.direction);
                     let mut stream = ray.stream;

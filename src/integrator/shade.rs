@@ -63,7 +63,7 @@ impl DirectLight {
             Part::left_out("light table", "no emissive surface with area")
         };
         let environment = if self.lights.has_environment() {
-            Part::built("environment", "constant, sampled by the cosine")
+            Part::built("environment", self.lights.environment_text())
         } else {
             Part::left_out("environment", "black")
         };

@@ -274,7 +274,7 @@ impl Subsurface {
     ) -> Rgb {
         tally.rays.bounce += 1;
         match view.rays.closest(&Ray::new(at.leave(direction), direction)) {
-            None => self.light.lights.environment(),
+            None => self.light.lights.environment(direction),
             Some(hit) => {
                 let there = view.point(&hit, direction);
                 emitted(view.scene, &hit, direction)
@@ -312,7 +312,7 @@ impl Integrator for Subsurface {
         let inside = self.inside(view, pass, rays, &hits, tally);
         for (((ray, hit), inside), out) in rays.iter().zip(&hits).zip(inside).zip(out) {
             *out = match hit {
-                None => self.light.lights.environment(),
+                None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) => self.shade(view, ray, hit, inside, tally),
             };
         }

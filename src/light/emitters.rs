@@ -1,6 +1,6 @@
-//! Triangle-mesh area lights and a constant environment.
+//! Triangle-mesh area lights, and the environment beside them.
 
-use super::Arrival;
+use super::{Arrival, Sky};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray};
@@ -13,7 +13,7 @@ pub struct Lights {
     emitters: Vec<Emitter>,
     /// Chance of each emitter and of all before it, in proportion to emitted power.
     cumulative: Vec<f64>,
-    environment: Rgb,
+    sky: Sky,
 }
 
 struct Emitter {
@@ -48,7 +48,7 @@ impl Lights {
             emitter.pdf_area = ((*sum - below) / emitter.table.area()) as f32;
             below = *sum;
         }
-        Self { emitters, cumulative, environment: scene.environment }
+        Self { emitters, cumulative, sky: Sky::new(&scene.environment) }
     }
 
     /// Whether there are area lights.
@@ -58,12 +58,18 @@ impl Lights {
 
     /// Whether light arrives from the environment.
     pub fn has_environment(&self) -> bool {
-        !self.environment.is_black()
+        !self.sky.is_black()
     }
 
-    /// Radiance from outside the scene; black without an environment.
-    pub fn environment(&self) -> Rgb {
-        self.environment
+    /// Radiance from outside the scene out of the direction of the unit vector `w`; black without an environment.
+    #[inline]
+    pub fn environment(&self, w: Vec3) -> Rgb {
+        self.sky.radiance(w)
+    }
+
+    /// What is said of the environment in a list of parts.
+    pub fn environment_text(&self) -> String {
+        self.sky.text()
     }
 
     /// Mean radiance of the area lights, by power and over the channels; 0 without any.
@@ -115,15 +121,12 @@ impl Lights {
         Some(Arrival { w, irradiance: emitter.radiance * (cos * solid_angle), pdf_angle: 1.0 / solid_angle, shadow })
     }
 
-    /// Light of the environment from a cosine-weighted direction about the surface's normal.
+    /// Light of the environment from one of the directions of [`Self::look_around`].
     pub fn sample_environment(&self, at: &SurfacePoint, u: [f32; 2]) -> Option<Arrival> {
-        let w = cosine_hemisphere(at.n, u);
-        (at.n_geometric.dot(w) > 0.0).then(|| Arrival {
-            w,
-            irradiance: self.environment * PI,
-            pdf_angle: at.n.dot(w) / PI,
-            shadow: Ray::new(at.leave(w), w),
-        })
+        let (w, shadow) = self.look_around(at, u)?;
+        let pdf_angle = self.pdf_around(at, w);
+        let irradiance = self.sky.radiance(w) * (at.n.dot(w) / pdf_angle);
+        Some(Arrival { w, irradiance, pdf_angle, shadow })
     }
 
     /// Chance per solid angle [1/sr] that [`Self::sample_emitter`] looks from `x` along the unit vector `w` to `hit`.
@@ -151,7 +154,20 @@ impl Lights {
 
     /// A cosine-weighted direction about the surface's normal and the ray that looks there.
     pub fn look_up(at: &SurfacePoint, u: [f32; 2]) -> Option<(Vec3, Ray)> {
-        let w = cosine_hemisphere(at.n, u);
-        (at.n_geometric.dot(w) > 0.0).then(|| (w, Ray::new(at.leave(w), w)))
+        looking(at, cosine_hemisphere(at.n, u))
     }
+
+    /// As [`Self::look_up`], but under a picture of the environment half of the directions are those it shines from.
+    pub fn look_around(&self, at: &SurfacePoint, u: [f32; 2]) -> Option<(Vec3, Ray)> {
+        looking(at, self.sky.sample(at.n, u))
+    }
+
+    /// Chance per solid angle [1/sr] of the direction `w` by [`Self::look_around`].
+    pub fn pdf_around(&self, at: &SurfacePoint, w: Vec3) -> f32 {
+        self.sky.pdf(at.n, w)
+    }
+}
+
+fn looking(at: &SurfacePoint, w: Vec3) -> Option<(Vec3, Ray)> {
+    (at.n.dot(w) > 0.0 && at.n_geometric.dot(w) > 0.0).then(|| (w, Ray::new(at.leave(w), w)))
 }

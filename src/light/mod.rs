@@ -2,11 +2,13 @@
 //! Not for: what the surface does with it (`integrator`, `cache`). Read first: [`Lights`].
 
 mod emitters;
+mod sky;
 
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::scene::{Scene, Surface};
 pub use emitters::Lights;
+pub use sky::Sky;
 
 /// One sampled direction from which light may arrive.
 #[derive(Clone, Copy, Debug)]

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::environment::{self, EnvironmentEntry};
 use super::materials::{self, MaterialEntry};
 use super::objects::{self, ObjectEntry};
 use super::options::{MethodOptions, RenderOptions, named};
@@ -22,8 +23,8 @@ pub struct SceneFile {
     pub objects: Vec<ObjectEntry>,
     /// `[material.NAME]`, in order.
     pub materials: Vec<MaterialEntry>,
-    /// `[environment]` radiance; black without one.
-    pub environment: Rgb,
+    /// `[environment]`; black without one.
+    pub environment: EnvironmentEntry,
     /// `[method]`.
     pub method: MethodOptions,
     /// `[render]`.
@@ -131,7 +132,7 @@ impl SceneFile {
             unit_in_mm,
             camera: camera(&top)?,
             objects: objects::read(&top, &materials)?,
-            environment: environment(&top)?,
+            environment: environment::read(&top)?,
             method: method(&top)?,
             render: render(&top)?,
             materials,
@@ -213,12 +214,6 @@ fn camera(top: &Fields<'_>) -> Result<CameraEntry> {
 /// The direction of `v`, whatever its length; `None` for zero.
 pub(super) fn unit_vector(v: DVec3) -> Option<DVec3> {
     (v / v.abs().max_element()).try_normalize()
-}
-
-fn environment(top: &Fields<'_>) -> Result<Rgb> {
-    let Some(e) = top.table("environment")? else { return Ok(Rgb::BLACK) };
-    e.only("[environment]", &["radiance"])?;
-    e.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0)).map(rgb)
 }
 
 /// What a radiance is.

@@ -1,7 +1,7 @@
 //! The way from the file as typed to the checked world: meshes read, placed and recentred in f64, then rounded.
 
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
 use super::file::{FovAxis, SceneFile, unit_vector};
@@ -30,7 +30,9 @@ impl Scene {
     /// As [`Self::load`].
     pub fn load_with(file: &SceneFile, repair: bool) -> Result<Self> {
         let mut said = Vec::new();
-        let placed = meshes(file, repair, &mut said)?;
+        let folder = file.path.parent().unwrap_or(Path::new(""));
+        let environment = file.environment.load(folder, &mut said)?;
+        let placed = meshes(file, folder, repair, &mut said)?;
         let centre = centre(&placed);
         let mut objects = Vec::with_capacity(placed.len());
         for (entry, mesh) in file.objects.iter().zip(placed) {
@@ -49,7 +51,7 @@ impl Scene {
             camera: camera(file, centre)?,
             objects,
             materials: materials(file),
-            environment: file.environment,
+            environment,
             warnings: Vec::new(),
         };
         said.extend(warnings::of(file, &scene));
@@ -77,8 +79,7 @@ impl Scene {
 }
 
 /// The objects' meshes in the scene's space, in f64.
-fn meshes(file: &SceneFile, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
-    let folder = file.path.parent().map(PathBuf::from).unwrap_or_default();
+fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
     let mut read: HashMap<PathBuf, Rc<ObjMesh>> = HashMap::new();
     let mut out = Vec::with_capacity(file.objects.len());
     for entry in &file.objects {

@@ -5,6 +5,7 @@
 
 mod camera;
 mod doctor;
+mod environment;
 mod file;
 mod load;
 mod materials;
@@ -16,6 +17,7 @@ mod world;
 
 pub use camera::Camera;
 pub use doctor::Remark;
+pub use environment::{Environment, EnvironmentEntry};
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};

@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Camera, Remark, doctor};
+use super::{Camera, Environment, Remark, doctor};
 use crate::bssrdf::{DirectionalDipole, Model, ModelName, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -22,8 +22,8 @@ pub struct Scene {
     pub objects: Vec<Object>,
     /// All materials; objects point into this list.
     pub materials: Vec<Material>,
-    /// Radiance from every direction that meets no surface [W/(m² sr) or any linear unit]; black without one.
-    pub environment: Rgb,
+    /// Light from every direction that meets no surface; black without one.
+    pub environment: Environment,
     /// Oddities a user should hear of, in order of the file.
     pub warnings: Vec<String>,
 }

@@ -58,7 +58,9 @@ impl<'a> CameraPath<'a> {
         for bounces in 0_u32.. {
             self.tally.rays.bounce += 1;
             let Some(hit) = self.view.rays.closest(&ray) else {
-                self.add(self.spectrum.value_outside() * self.method.light.lights.environment() * self.other);
+                self.add(
+                    self.spectrum.value_outside() * self.method.light.lights.environment(ray.direction) * self.other,
+                );
                 return;
             };
             let Some(next) = self.meet(&hit, ray.direction) else { return };
@@ -73,7 +75,7 @@ impl<'a> CameraPath<'a> {
     pub fn meet_light(&mut self, ray: &Ray) {
         self.tally.rays.bounce += 1;
         match self.view.rays.closest(ray) {
-            None => self.add(self.spectrum.value_outside() * self.method.light.lights.environment()),
+            None => self.add(self.spectrum.value_outside() * self.method.light.lights.environment(ray.direction)),
             Some(hit) if self.aimed.iter().all(|aim| aim.object != hit.mesh) => {
                 self.add(self.spectrum.value_outside() * emitted(self.view.scene, &hit, ray.direction));
             }

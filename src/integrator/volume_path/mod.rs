@@ -205,7 +205,7 @@ impl Integrator for VolumePath {
         let mut scratch = Scratch::default();
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
-                None => self.of_order_0(self.light.lights.environment()),
+                None => self.of_order_0(self.light.lights.environment(ray.ray.direction)),
                 Some(hit) => self.shade(view, pass, ray, &mut scratch, tally, hit),
             };
         }

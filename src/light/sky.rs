@@ -1,0 +1,286 @@
+//! The environment: the same radiance all around, or a picture of all directions with a table of where it shines.
+
+use crate::film::Image;
+use crate::math::{Rgb, Vec3};
+use crate::sampling::cosine_hemisphere;
+use crate::scene::Environment;
+use std::f32::consts::PI;
+use std::f64::consts::{PI as PI64, TAU as TAU64};
+use std::sync::Arc;
+
+/// Light from every direction that meets no surface.
+pub struct Sky {
+    radiance: Rgb,
+    picture: Option<Picture>,
+}
+
+/// Share of the directions that are picked by where a picture shines; the rest by the cosine, so that a picture's dark half,
+/// and a wall before its bright one, cost at most twice the samples.
+const BY_PICTURE: f32 = 0.5;
+
+impl Sky {
+    /// The environment of a scene; the table has 4 bytes for each pixel of its picture.
+    pub fn new(environment: &Environment) -> Self {
+        let picture = environment.image.clone().map(|image| Picture::new(image, environment.turn));
+        let dark = environment.is_black() || picture.as_ref().is_some_and(Picture::is_black);
+        Self { radiance: if dark { Rgb::BLACK } else { environment.radiance }, picture: picture.filter(|_| !dark) }
+    }
+
+    /// Whether no light comes from it.
+    pub fn is_black(&self) -> bool {
+        self.radiance.is_black()
+    }
+
+    /// Radiance out of the direction of the unit vector `w`.
+    #[inline]
+    pub fn radiance(&self, w: Vec3) -> Rgb {
+        match &self.picture {
+            None => self.radiance,
+            Some(picture) => self.radiance * picture.at(w),
+        }
+    }
+
+    /// A direction by the cosine about the unit vector `n`; under a picture, half of them by its light instead, which may
+    /// lie below the horizon.
+    pub fn sample(&self, n: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+        match &self.picture {
+            None => cosine_hemisphere(n, [u, v]),
+            Some(picture) if u < BY_PICTURE => picture.sample([u / BY_PICTURE, v]),
+            Some(_) => cosine_hemisphere(n, [(u - BY_PICTURE) / (1.0 - BY_PICTURE), v]),
+        }
+    }
+
+    /// Chance per solid angle [1/sr] of `w` by [`Self::sample`].
+    pub fn pdf(&self, n: Vec3, w: Vec3) -> f32 {
+        let cosine = n.dot(w).max(0.0) / PI;
+        match &self.picture {
+            None => cosine,
+            Some(picture) => BY_PICTURE * picture.pdf(w) + (1.0 - BY_PICTURE) * cosine,
+        }
+    }
+
+    /// What there is, in words.
+    pub fn text(&self) -> String {
+        match &self.picture {
+            None => "constant, sampled by the cosine".into(),
+            Some(p) => format!("{} x {} pixels, sampled by what they send and by the cosine", p.width, p.height),
+        }
+    }
+}
+
+/// A picture of all directions, interpolated between its pixels' centres. A patch is what lies between four of them; the
+/// first and the last row of patches, half as high, lie between a row of pixels and a pole.
+struct Picture {
+    image: Arc<Image>,
+    width: usize,
+    height: usize,
+    /// Turn about the y axis [turns].
+    turn: f32,
+    /// Chance of each row of patches and of all above it.
+    rows: Vec<f64>,
+    /// Chance within its row of each patch and of all to its left.
+    columns: Vec<f32>,
+    /// Cosines of the angles from +y between the rows.
+    cosines: Vec<f64>,
+}
+
+impl Picture {
+    fn new(image: Arc<Image>, turn: f32) -> Self {
+        let [width, height] = image.resolution.map(|n| n as usize);
+        let cosine = |k: usize| match k {
+            0 => 1.0,
+            k if k > height => -1.0,
+            k => ((k as f64 - 0.5) / height as f64 * PI64).cos(),
+        };
+        let cosines: Vec<f64> = (0..=height + 1).map(cosine).collect();
+        let mut picture = Self {
+            image,
+            width,
+            height,
+            turn,
+            rows: Vec::with_capacity(height + 1),
+            columns: Vec::with_capacity((height + 1) * width),
+            cosines,
+        };
+        let mut total = 0.0;
+        for k in 0..=height {
+            let mut row = 0.0;
+            let sums = (0..width).map(|i| {
+                row += picture.corners(k, i).iter().map(|p| f64::from(p.mean())).sum::<f64>();
+                row
+            });
+            let sums: Vec<f64> = sums.collect();
+            // A row without light gets even shares, which nothing picks.
+            let share =
+                |(i, sum): (usize, f64)| if row > 0.0 { sum / row } else { (i + 1) as f64 / width as f64 } as f32;
+            picture.columns.extend(sums.into_iter().enumerate().map(share));
+            total += row * (picture.cosines[k] - picture.cosines[k + 1]);
+            picture.rows.push(total);
+        }
+        for row in &mut picture.rows {
+            *row /= total;
+        }
+        picture
+    }
+
+    fn is_black(&self) -> bool {
+        !self.rows.last().is_some_and(|last| last.is_finite())
+    }
+
+    /// The pixels at the corners of patch `i` of row `k`: upper left, upper right, lower left, lower right.
+    #[inline]
+    fn corners(&self, k: usize, i: usize) -> [Rgb; 4] {
+        let (above, below) = (k.saturating_sub(1), k.min(self.height - 1));
+        let right = if i + 1 < self.width { i + 1 } else { 0 };
+        let at = |row: usize, column: usize| self.image.pixels[row * self.width + column];
+        [at(above, i), at(above, right), at(below, i), at(below, right)]
+    }
+
+    /// Row and column of the patch in the direction `w`, and the place in it, to the right and downwards.
+    #[inline]
+    fn patch(&self, w: Vec3) -> (usize, usize, [f32; 2]) {
+        // As atan2 counts, +z is half a turn and +x a quarter.
+        let across = (w.x.atan2(-w.z) / (2.0 * PI) + self.turn).rem_euclid(1.0) * self.width as f32 - 0.5;
+        let down = w.x.hypot(w.z).atan2(w.y) / PI * self.height as f32 + 0.5;
+        let column = across.floor();
+        let k = (down.max(0.0) as usize).min(self.height);
+        let i = if column < 0.0 { self.width - 1 } else { (column as usize).min(self.width - 1) };
+        (k, i, [(across - column).clamp(0.0, 1.0), (down - k as f32).clamp(0.0, 1.0)])
+    }
+
+    fn at(&self, w: Vec3) -> Rgb {
+        let (k, i, [x, y]) = self.patch(w);
+        let [a, b, c, d] = self.corners(k, i);
+        (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y
+    }
+
+    /// Chance of the patch `i` in row `k`, and of those before the row and the column.
+    fn chance(&self, k: usize, i: usize) -> ([f64; 2], [f32; 2]) {
+        let above = if k == 0 { 0.0 } else { self.rows[k - 1] };
+        let row = &self.columns[k * self.width..(k + 1) * self.width];
+        let left = if i == 0 { 0.0 } else { row[i - 1] };
+        ([above, self.rows[k]], [left, row[i]])
+    }
+
+    /// A direction from which light comes: a patch by its mean radiance times its solid angle, evenly in it.
+    fn sample(&self, [u, v]: [f32; 2]) -> Vec3 {
+        let pick = f64::from(u);
+        let k = self.rows.partition_point(|&c| c <= pick).min(self.height);
+        let row = &self.columns[k * self.width..(k + 1) * self.width];
+        let i = row.partition_point(|&c| c <= v).min(self.width - 1);
+        let ([above, rows], [left, columns]) = self.chance(k, i);
+        let y = ((pick - above) / (rows - above)).clamp(0.0, 1.0);
+        let x = f64::from(((v - left) / (columns - left)).clamp(0.0, 1.0));
+        let cosine = self.cosines[k] + y * (self.cosines[k + 1] - self.cosines[k]);
+        let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
+        let angle = TAU64 * ((i as f64 + 0.5 + x) / self.width as f64 - f64::from(self.turn));
+        Vec3::new((sine * angle.sin()) as f32, cosine as f32, (-sine * angle.cos()) as f32)
+    }
+
+    /// Chance per solid angle [1/sr] of `w` by [`Self::sample`].
+    fn pdf(&self, w: Vec3) -> f32 {
+        let (k, i, _) = self.patch(w);
+        let ([above, rows], [left, columns]) = self.chance(k, i);
+        let solid = TAU64 / self.width as f64 * (self.cosines[k] - self.cosines[k + 1]);
+        ((rows - above) * f64::from(columns - left) / solid) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{hash, unit_f32};
+
+    fn numbers(seed: u64) -> [f32; 2] {
+        [0, 1].map(|i| unit_f32((hash(2 * seed + i) >> 32) as u32))
+    }
+
+    fn sky(resolution: [u32; 2], turn: f32, pixel: impl FnMut(u32, u32) -> Rgb) -> Sky {
+        let image = Some(Arc::new(Image::from_fn(resolution, pixel)));
+        Sky::new(&Environment { radiance: Rgb::splat(2.0), image, turn })
+    }
+
+    #[test]
+    fn directions_have_their_place_in_the_picture() {
+        // Columns 0..8 from -z by +x, +z, -x and round; rows from +y down.
+        let columns = sky([8, 4], 0.0, |x, _| Rgb::splat(x as f32));
+        let turned = sky([8, 4], 0.25, |x, _| Rgb::splat(x as f32));
+        for (x, z, across) in [(1.0, 0.0, 2.0), (0.0, 1.0, 4.0), (-1.0, 0.0, 6.0)] {
+            // Between the centres of two pixels.
+            let found = columns.radiance(Vec3::new(x, 0.0, z));
+            assert!((found.mean() - 2.0 * (across - 0.5)).abs() < 1e-4, "{found:?}");
+        }
+        // Counterclockwise from above takes +z to +x.
+        let (before, after) = (columns.radiance(Vec3::Z), turned.radiance(Vec3::X));
+        assert!((before.mean() - after.mean()).abs() < 1e-4, "{before:?} {after:?}");
+        let rows = sky([8, 4], 0.0, |_, y| Rgb::splat(y as f32));
+        assert_eq!(rows.radiance(Vec3::Y).mean(), 0.0);
+        assert_eq!(rows.radiance(-Vec3::Y).mean(), 6.0);
+        assert!((rows.radiance(Vec3::X).mean() - 3.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_picture_of_one_value_is_a_constant() {
+        let sky = sky([6, 3], 0.1, |_, _| Rgb([0.5, 1.0, 1.5]));
+        for seed in 0..100 {
+            let w = sky.sample(Vec3::Y, numbers(seed));
+            assert!((w.length() - 1.0).abs() < 1e-6);
+            for c in 0..3 {
+                assert!((sky.radiance(w)[c] - (c + 1) as f32).abs() < 1e-6);
+            }
+        }
+    }
+
+    /// Irradiance by the table against a sum over the picture: a small sun among dim, noisy pixels.
+    #[test]
+    fn sampled_irradiance_is_that_of_the_picture() {
+        for (resolution, turn) in [([32, 16], 0.0), ([31, 7], 0.3), ([1, 1], -0.2), ([2, 300], 0.9)] {
+            let pixel = |x: u32, y: u32| {
+                let sun = if (x, y) == (5, 3) { 500.0 } else { 0.0 };
+                Rgb::splat(sun + unit_f32((hash(u64::from(x * 1000 + y + 1)) >> 32) as u32))
+            };
+            let sky = sky(resolution, turn, pixel);
+            let n = Vec3::new(0.3, 0.8, -0.5).normalize();
+            let (mut exact, steps) = (0.0, 600);
+            for i in 0..steps {
+                for j in 0..2 * steps {
+                    let (theta, phi) = (
+                        (f64::from(i) + 0.5) / f64::from(steps) * PI64,
+                        (f64::from(j) + 0.5) / f64::from(steps) * PI64,
+                    );
+                    let w = Vec3::new(
+                        (theta.sin() * phi.cos()) as f32,
+                        theta.cos() as f32,
+                        (theta.sin() * phi.sin()) as f32,
+                    );
+                    let weight = theta.sin() * (PI64 / f64::from(steps)).powi(2);
+                    exact += f64::from(sky.radiance(w).mean() * n.dot(w).max(0.0)) * weight;
+                }
+            }
+            let count = 200_000;
+            let (mut sum, mut squares, mut whole) = (0.0, 0.0, 0.0);
+            for seed in 0..count {
+                let w = sky.sample(n, numbers(seed));
+                let value = f64::from(sky.radiance(w).mean() * n.dot(w).max(0.0) / sky.pdf(n, w));
+                sum += value;
+                squares += value * value;
+                // One over the density of the picture's own directions is the whole sphere.
+                if let Some(picture) = &sky.picture {
+                    whole += 1.0 / f64::from(picture.pdf(picture.sample(numbers(seed))));
+                }
+            }
+            let mean = sum / count as f64;
+            let error = ((squares / count as f64 - mean * mean) / count as f64).sqrt();
+            assert!((mean - exact).abs() < 6.0 * error + 1e-3 * exact, "{resolution:?}: {mean} +- {error}, {exact}");
+            let sphere = whole / count as f64 / (4.0 * PI64);
+            assert!((sphere - 1.0).abs() < 0.05, "{resolution:?}: {sphere}");
+        }
+    }
+
+    #[test]
+    fn a_black_picture_is_no_light() {
+        assert!(sky([4, 2], 0.0, |_, _| Rgb::BLACK).is_black());
+        let faint = sky([4, 2], 0.0, |x, y| if x + y == 0 { Rgb::splat(1e-30) } else { Rgb::BLACK });
+        assert!(!faint.is_black() && faint.pdf(Vec3::Y, Vec3::Y).is_finite());
+    }
+}
