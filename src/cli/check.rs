@@ -4,7 +4,9 @@ use super::setup::{MethodArgs, prepare};
 use marmor::Result;
 use marmor::film::{Film, write_atomically};
 use marmor::geometry::{Mended, Mesh, load_obj, mended, write_obj};
+use marmor::integrator::{LocalShape, TOLERANCE, Trustworthiness, View};
 use marmor::optics::Medium;
+use marmor::query;
 use marmor::scene::{Geometry, Scene, Surface};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -19,6 +21,9 @@ pub struct Args {
     /// Write a mended OBJ file of each mesh that can be mended into this folder, under the object's name
     #[arg(long, value_name = "FOLDER")]
     write_mended: Option<PathBuf>,
+    /// What counts as wrong where models are judged, as a share of the light
+    #[arg(long, value_name = "E", default_value_t = TOLERANCE)]
+    tolerance: f64,
     /// Print one JSON object instead of a text
     #[arg(long)]
     json: bool,
@@ -37,6 +42,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let film_bytes = pixels * Film::BYTES_PER_PIXEL;
     let picture_bytes = pixels * BYTES_PER_PIXEL_OF_PICTURES;
     let available = marmor::memory::available();
+    let trust = trust(&prepared, args.tolerance)?;
     if args.json {
         let objects: Vec<Value> = scene.objects.iter().map(|o| object_json(scene, o)).collect();
         let report = json!({
@@ -47,6 +53,11 @@ pub fn run(args: Args) -> Result<ExitCode> {
             "backend": prepared.backend.name(),
             "objects": objects,
             "parts": parts,
+            "validity": trust.iter().map(|t| {
+                let mut value = json!(t);
+                value["sentence"] = t.sentence().into();
+                value
+            }).collect::<Vec<_>>(),
             "film_bytes": film_bytes,
             "picture_bytes": picture_bytes,
             "available_bytes": available,
@@ -83,6 +94,10 @@ pub fn run(args: Args) -> Result<ExitCode> {
             println!("    {}: {}", if remark.warns { "warning" } else { "note" }, remark.text);
         }
     }
+    if !trust.is_empty() {
+        println!("\nwhich model to trust");
+        trust.iter().for_each(|t| println!("  {}", t.sentence()));
+    }
     for (built, title) in [(true, "built"), (false, "left out")] {
         println!("\n{title}");
         for part in parts.iter().filter(|p| p.built == built) {
@@ -96,6 +111,20 @@ pub fn run(args: Args) -> Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// How far models can be trusted on each translucent object; rays are built for nothing else.
+fn trust(prepared: &super::setup::Prepared, tolerance: f64) -> Result<Vec<Trustworthiness>> {
+    let scene = &prepared.scene;
+    let translucent = |object: &u32| matches!(scene.surface(*object), Surface::Translucent(_));
+    let objects: Vec<u32> = (0..scene.objects.len() as u32).filter(translucent).collect();
+    if objects.is_empty() {
+        return Ok(Vec::new());
+    }
+    let rays = query::build(prepared.backend, &scene.meshes())?;
+    let view = View { scene, rays: &*rays };
+    let of = |object: u32| Trustworthiness::new(view, &LocalShape::new(scene, object)?, tolerance);
+    Ok(objects.into_iter().filter_map(of).collect())
 }
 
 /// Samples of a pass, the picture, and what goes into an EXR file, beside the film.

@@ -5,7 +5,9 @@ use super::keep::cancel_on_signals;
 use super::race::{Entrant, Runner, command, machine, race};
 use super::render::duration;
 use super::setup::MethodArgs;
-use marmor::film::{Image, Metadata, PngOptions, metrics, png_bytes, save, write_atomically};
+use marmor::film::{
+    Checkpoint, Format, Image, Metadata, PngOptions, SelfError, metrics, png_bytes, save, write_atomically,
+};
 use marmor::math::Rgb;
 use marmor::report::{Compared, ModelComparison, Picture, common_range, false_colours};
 use marmor::scene::MethodName;
@@ -28,8 +30,8 @@ pub struct Args {
     /// What the models are held against, in the words of a model [default: volume_path]
     #[arg(long, value_name = "METHOD", conflicts_with = "reference")]
     truth: Option<String>,
-    /// Hold the models against this EXR instead
-    #[arg(long, value_name = "EXR")]
+    /// Hold the models against this EXR instead, or this film file, which also tells its own noise
+    #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Time of rendering for each model, such as 20s
     #[arg(long, value_name = "TIME", value_parser = duration, default_value = "20s")]
@@ -84,7 +86,7 @@ fn compare(args: &Args) -> Result<ExitCode> {
     let budget = args.time_budget.as_secs_f64();
     let reference_budget = args.reference_budget.map_or(3.0 * budget, |t| t.as_secs_f64());
     let truth = match &args.reference {
-        Some(path) => Truth { text: path.display().to_string(), image: Image::read_exr(path)?, noise: 0.0 },
+        Some(path) => stored(path)?,
         None => {
             let spec = args.truth.as_deref().unwrap_or(MethodName::VolumePath.name());
             say(&format!("reference {spec}: {reference_budget:.0} s"));
@@ -107,6 +109,17 @@ fn compare(args: &Args) -> Result<ExitCode> {
     }
     say(&format!("wrote {}", args.output.join("index.html").display()));
     Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) })
+}
+
+/// A picture that was rendered before. An EXR counts as free of noise; a film has the halves that tell it.
+fn stored(path: &Path) -> Result<Truth> {
+    let text = path.file_name().map_or("stored picture".into(), |name| name.to_string_lossy().into_owned());
+    if Format::of(path).is_ok_and(|format| format == Format::Film) {
+        let film = Checkpoint::read(path)?.film;
+        let noise = SelfError::new().measure(&film).and_then(|e| e.relmse).map_or(0.0, |e| e.value);
+        return Ok(Truth { text: format!("{text}, {} samples", film.passes()), image: film.image(), noise });
+    }
+    Ok(Truth { text, image: Image::read_exr(path)?, noise: 0.0 })
 }
 
 /// Longest side of a picture on the page [pixels].

@@ -27,7 +27,7 @@ pub struct KeepArgs {
 
 /// Writes film files while a render runs.
 pub struct Keeper<'a> {
-    outputs: &'a Outputs,
+    outputs: &'a Outputs<'a>,
     every: Option<Duration>,
     last: Instant,
     hangup: Arc<AtomicBool>,
@@ -56,7 +56,7 @@ impl KeepArgs {
     /// The film to start with, empty or from its file, what it took so far, and its keeper.
     pub fn start<'a>(
         &self,
-        outputs: &'a Outputs,
+        outputs: &'a Outputs<'a>,
         resolution: [u32; 2],
         window: Window,
         end: Option<u32>,

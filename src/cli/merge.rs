@@ -1,6 +1,7 @@
 //! `marmor merge`: parts of one render become one.
 
-use super::outputs::{LayerName, Outputs, progress};
+use super::layers::{LayerName, Layers};
+use super::outputs::{Outputs, progress};
 use marmor::film::{Checkpoint, check_writable};
 use marmor::{Error, Result};
 use std::path::PathBuf;
@@ -28,6 +29,7 @@ pub struct Args {
 
 /// Runs the command. The result is that of one render of all passes, bit for bit.
 pub fn run(args: Args) -> Result<ExitCode> {
+    let layers = Layers::new(&args.layers, None)?;
     for path in &args.output {
         check_writable(path)?;
     }
@@ -49,7 +51,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         return Err(Error::usage("the parts have no passes: there is no picture"));
     }
     let exposure = args.exposure.unwrap_or(exposure);
-    let outputs = Outputs { paths: args.output, identity, attributes, exposure, layers: args.layers };
+    let outputs = Outputs { paths: args.output, identity, attributes, exposure, layers };
     let said = outputs.save(&film, &spent)?;
     if !args.quiet {
         said.iter().for_each(|line| eprintln!("{line}"));

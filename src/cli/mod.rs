@@ -23,6 +23,7 @@ mod converge;
 mod diff;
 mod eval;
 mod keep;
+mod layers;
 mod materials;
 mod merge;
 mod observers;

@@ -1,33 +1,17 @@
 //! What becomes of a film: pictures, and film files to go on with.
 
+use super::layers::Layers;
 use super::setup::Prepared;
+use marmor::Result;
 use marmor::film::{
-    Attribute, Checkpoint, Film, Format, Identity, Layer, Metadata, PngOptions, Window, save_with_layers,
-    source_date_epoch, variance,
+    Attribute, Checkpoint, Film, Format, Identity, Metadata, PngOptions, Window, save_with_layers, source_date_epoch,
 };
 use marmor::render::Spent;
-use marmor::{Error, Result};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
-/// What an EXR may hold beside the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum LayerName {
-    /// Variance of each pixel's mean
-    Variance,
-}
-
-/// The layers asked for, each once.
-fn layers(names: &[LayerName], film: &Film) -> Result<Vec<Layer>> {
-    if !names.contains(&LayerName::Variance) {
-        return Ok(Vec::new());
-    }
-    let image = variance(film).ok_or_else(|| Error::usage("--layers variance needs at least 2 samples per pixel"))?;
-    Ok(vec![Layer { name: "Variance".into(), image }])
-}
-
 /// Where a film goes, and what its files say of it.
-pub struct Outputs {
+pub struct Outputs<'a> {
     /// Files asked for.
     pub paths: Vec<PathBuf>,
     /// What decides every bit of the film.
@@ -37,12 +21,19 @@ pub struct Outputs {
     /// Stops for a PNG.
     pub exposure: f64,
     /// What an EXR holds beside the picture.
-    pub layers: Vec<LayerName>,
+    pub layers: Layers<'a>,
 }
 
-impl Outputs {
+impl<'a> Outputs<'a> {
     /// Of a render of `prepared` on a backend that calls itself `backend`.
-    pub fn new(prepared: &Prepared, backend: &str, window: Window, paths: Vec<PathBuf>, exposure: f64) -> Self {
+    pub fn new(
+        prepared: &Prepared,
+        backend: &str,
+        window: Window,
+        paths: Vec<PathBuf>,
+        exposure: f64,
+        layers: Layers<'a>,
+    ) -> Self {
         let mut attributes: Vec<(String, String)> = [
             ("scene", prepared.file.effective()),
             ("method", prepared.method.name().into()),
@@ -52,7 +43,7 @@ impl Outputs {
         .map(|(key, value)| (key.to_string(), value))
         .into();
         attributes.extend(prepared.method_attributes().into_iter().map(|(key, value)| (key.to_string(), value)));
-        Self { paths, identity: identity(prepared, backend, window), attributes, exposure, layers: Vec::new() }
+        Self { paths, identity: identity(prepared, backend, window), attributes, exposure, layers }
     }
 
     /// Writes every file, also those after one that fails. What a PNG could not hold is in the lines returned.
@@ -66,7 +57,7 @@ impl Outputs {
             created: source_date_epoch(),
             attributes: self.all_attributes(film, spent),
         };
-        let (image, layers) = (film.image(), layers(&self.layers, film)?);
+        let (image, layers) = (film.image(), self.layers.of(film)?);
         let (mut said, mut failed) = (Vec::new(), None);
         for path in &self.paths {
             let saved = match Format::of(path)? {

@@ -2,8 +2,9 @@
 
 use super::INTERRUPTED;
 use super::keep::{KeepArgs, Keeper, cancel_on_signals};
+use super::layers::{LayerName, Layers};
 use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
-use super::outputs::{LayerName, Outputs};
+use super::outputs::Outputs;
 use super::replay;
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
@@ -50,7 +51,7 @@ pub struct Args {
     /// Render these pixels only: x0,y0,x1,y1, the last two exclusive
     #[arg(long, value_name = "X0,Y0,X1,Y1", value_parser = window)]
     crop: Option<Window>,
-    /// Further layers in the EXR, separated by commas: variance
+    /// Further layers in the EXR, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     layers: Vec<LayerName>,
     /// Brighten or darken the PNG by this many stops [default: the scene's, else 0]
@@ -140,8 +141,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
             return replay::run(&prepared, view, &job, pixel, args.pass);
         }
         let exposure = args.exposure.or(prepared.file.render.exposure).unwrap_or(0.0);
-        let mut outputs = Outputs::new(&prepared, &rays.description(), window, outputs, exposure);
-        outputs.layers.clone_from(&args.layers);
+        let layers = Layers::new(&args.layers, Some((&prepared, view)))?;
+        let outputs = Outputs::new(&prepared, &rays.description(), window, outputs, exposure, layers);
         let (mut film, spent, mut keeper) = args.keep.start(&outputs, resolution, window, job.passes)?;
         if film.passes() > 0 && verbosity > Verbosity::Quiet {
             eprintln!("going on from {} after {} passes", keeper.path.display(), film.passes());

@@ -1,6 +1,6 @@
 //! Writing OpenEXR: linear `f32` channels by name, and what they are in attributes.
 
-use super::{Image, Window};
+use super::{Image, Layer, Window};
 use crate::{Error, Result};
 use exr::prelude as exr;
 use std::collections::BTreeMap;
@@ -50,11 +50,20 @@ pub(super) fn software() -> String {
     concat!("marmor ", env!("CARGO_PKG_VERSION")).into()
 }
 
-/// The channels of `image`: `R`, `G`, `B`, or those of the layer `layer`.
-pub(super) fn channels(image: &Image, layer: Option<&str>) -> Vec<Channel> {
-    let name = |c: &str| layer.map_or_else(|| c.to_string(), |layer| format!("{layer}.{c}"));
+/// The channels of `image`: `R`, `G`, `B`.
+pub(super) fn channels(image: &Image) -> Vec<Channel> {
+    planes(image, &["R", "G", "B"], str::to_string)
+}
+
+/// The channels of a layer.
+pub(super) fn layer_channels(layer: &Layer) -> Vec<Channel> {
+    let name = |c: &str| if layer.name.is_empty() { c.to_string() } else { format!("{}.{c}", layer.name) };
+    planes(&layer.image, layer.channels, name)
+}
+
+fn planes(image: &Image, channels: &[&str], name: impl Fn(&str) -> String) -> Vec<Channel> {
     let plane = |c: usize| image.pixels.iter().map(|pixel| pixel[c]).collect();
-    [0, 1, 2].map(|c| Channel { name: name(["R", "G", "B"][c]), samples: plane(c) }).into()
+    channels.iter().take(3).enumerate().map(|(c, channel)| Channel { name: name(channel), samples: plane(c) }).collect()
 }
 
 /// The bytes of an EXR file of one part: scan lines, ZIP over 16 lines (lossless). The same arguments give the
@@ -192,7 +201,8 @@ mod tests {
         let bytes = || {
             let attributes = (0..40).map(|i| (format!("marmor:a{i}"), Attribute::Count(i))).collect();
             let metadata = Metadata { samples_per_pixel: 4, attributes, ..Default::default() };
-            let planes = channels(&image, None).into_iter().chain(channels(&image, Some("sss"))).collect();
+            let layer = Layer { name: "sss".into(), channels: &["R", "G"], image: image.clone() };
+            let planes = channels(&image).into_iter().chain(layer_channels(&layer)).collect();
             encode(image.resolution, image.window, planes, &metadata).unwrap()
         };
         assert_eq!(bytes(), bytes());

@@ -60,11 +60,13 @@ pub fn save(image: &Image, path: &Path, metadata: &Metadata, png: PngOptions) ->
     save_with_layers(image, &[], path, metadata, png)
 }
 
-/// A picture beside the main one in an EXR file: channels `NAME.R`, `NAME.G`, `NAME.B`.
+/// A picture beside the main one in an EXR file, such as `NAME.R`, `NAME.G`, `NAME.B`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// Before the dot.
+    /// Before the dot; without a name there is no dot.
     pub name: String,
+    /// What stands after the dot, one to three of the picture's channels.
+    pub channels: &'static [&'static str],
     /// Of the same window as the main picture.
     pub image: Image,
 }
@@ -85,9 +87,9 @@ pub fn save_with_layers(
             if let Some(layer) = layers.iter().find(|layer| layer.image.window != image.window) {
                 return Err(Error::usage(format!("the layer `{}` has another window than the picture", layer.name)));
             }
-            let mut channels = exr_file::channels(image, None);
+            let mut channels: Vec<exr_file::Channel> = exr_file::channels(image);
             for layer in layers {
-                channels.extend(exr_file::channels(&layer.image, Some(&layer.name)));
+                channels.extend(exr_file::layer_channels(layer));
             }
             let bytes = exr_file::encode(image.resolution, image.window, channels, metadata)
                 .map_err(|e| e.within(path.display()))?;

@@ -3,6 +3,7 @@
 
 mod area_table;
 mod clearance;
+mod curvature;
 mod doctor;
 mod mesh;
 mod morton;
@@ -13,6 +14,7 @@ mod shapes;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
+pub use curvature::Curvature;
 pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, SurfacePoint};
 pub use morton::morton_code;

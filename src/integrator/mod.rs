@@ -3,9 +3,12 @@
 
 mod ambient_occlusion;
 mod direct;
+mod first_order;
+mod local;
 mod shade;
 mod single;
 mod subsurface;
+mod trust;
 mod volume_path;
 
 use crate::cache::GatherTally;
@@ -16,7 +19,10 @@ use crate::sampling::PixelStream;
 use crate::scene::Scene;
 pub use ambient_occlusion::AmbientOcclusion;
 pub use direct::Direct;
+pub use first_order::FirstOrder;
+pub use local::{Local, LocalShape};
 pub use subsurface::{Subsurface, SubsurfaceOptions};
+pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness};
 pub use volume_path::{Left, VolumePath, VolumePathOptions};
 
 /// The scene and the backend that was built for it.

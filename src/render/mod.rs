@@ -1,11 +1,14 @@
 //! Passes over tiles on all cores. Knows passes and pixels, nothing of methods or files: progress, limits and records
 //! are observers called between passes with the clock stopped. Read first: [`run`].
 
+mod first_hit;
+
 use crate::error::Result;
 use crate::film::{Film, Window};
 use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
 use crate::sampling::{Pairs, PixelStream, Turn};
+pub use first_hit::{Seen, first_hit};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

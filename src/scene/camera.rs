@@ -35,6 +35,11 @@ impl Camera {
         Some(Self { resolution, origin, forward, right: right * half_width, up: up * half_height })
     }
 
+    /// Unit direction of view.
+    pub fn forward(&self) -> Vec3 {
+        self.forward
+    }
+
     /// The ray through `offset` in [0,1)² of a pixel.
     #[inline]
     pub fn ray(&self, pixel: [u32; 2], offset: [f32; 2]) -> Ray {

@@ -1,0 +1,236 @@
+//! How wrong each model is on plane half spaces, slabs and balls: a pencil beam enters along the normal, and what comes
+//! out is compared with paths through the medium, ring by ring. Prints the table `src/bssrdf/expected.csv`; docs/models.md has
+//! the method. `MARMOR_BENCH_PATHS` (100000) sets the paths a shape, `MARMOR_BENCH_ONLY` picks rows by their first words.
+#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)] // a bench that cannot run says so by stopping
+
+#[path = "../tests/support/pencils.rs"]
+mod pencils;
+
+use marmor::bssrdf::{Bssrdf, DirectionalDipole, Entry, Exit, Model, ModelName, ModelVisitor};
+use marmor::math::{Rgb, Vec3};
+use marmor::optics::{FresnelMoments, Medium};
+use pencils::{Body, Shape};
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Rings: six to a decade from 0.1 to 100 transport mean free paths, and what is left on both sides.
+const RINGS: usize = 20;
+
+fn ring(r: f32) -> usize {
+    if r < 0.1 { 0 } else { (1.0 + 6.0 * (r / 0.1).log10()).min(RINGS as f32 - 1.0) as usize }
+}
+
+fn ring_end(i: usize) -> f64 {
+    if i + 1 == RINGS { 1e4 } else { 0.1 * 10f64.powf(i as f64 / 6.0) }
+}
+
+/// Reduced albedos; with g = 0 all come from the same paths.
+const ALBEDOS: [f64; 9] = [0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 0.99, 0.999];
+/// The albedo of these paths.
+const TRACED: f64 = 0.9993;
+/// Thicknesses of slabs and radii of balls [transport mean free paths].
+const SIZES: [f32; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
+
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    n: f64,
+    squares: f64,
+}
+
+impl Sum {
+    fn add(&mut self, w: f64) {
+        self.n += w;
+        self.squares += w * w;
+    }
+    fn join(mut self, other: Self) -> Self {
+        self.n += other.n;
+        self.squares += other.squares;
+        self
+    }
+    /// Mean over `paths` and its variance.
+    fn mean(&self, paths: f64) -> (f64, f64) {
+        let mean = self.n / paths;
+        (mean, (self.squares / paths - mean * mean).max(0.0) / paths)
+    }
+}
+
+/// Light by face (near, far), ring and order (0, 1, 2 and more).
+type Truth = [[[Sum; 3]; RINGS]; 2];
+
+/// The truth for several albedos from one set of paths: weights times (α / traced)^order.
+fn trace(shape: Shape, medium: Medium, factors: &[f64], paths: u64, seed: u64) -> Vec<Truth> {
+    let body = Body::new(shape, medium);
+    let blocks = 64;
+    let empty = || vec![[[[Sum::default(); 3]; RINGS]; 2]; factors.len()];
+    let block = |b: u64| {
+        let mut truth = empty();
+        body.run(b * (paths / blocks)..(b + 1) * (paths / blocks), seed, |out| {
+            let ring = ring(if matches!(shape, Shape::Ball { .. }) { out.chord } else { out.r });
+            for (truth, factor) in truth.iter_mut().zip(factors) {
+                let w = f64::from(out.weight) * factor.powi(out.order as i32);
+                truth[usize::from(out.far)][ring][out.order.min(2) as usize].add(w);
+            }
+        });
+        truth
+    };
+    let join = |mut a: Vec<Truth>, b: Vec<Truth>| {
+        for (a, b) in a.iter_mut().flatten().flatten().flatten().zip(b.iter().flatten().flatten().flatten()) {
+            *a = a.join(*b);
+        }
+        a
+    };
+    (0..blocks).into_par_iter().map(block).reduce(empty, join)
+}
+
+/// S_d of a pencil beam straight into the body, to the exit at chord or radius r of a face, by a model's own type.
+struct Rings {
+    shape: Shape,
+}
+
+impl Rings {
+    /// Exit at distance `r` from the entry: along the plane on a slab, straight on a ball. Entry at 0, normal z.
+    fn exit(&self, far: bool, r: f64) -> Exit {
+        let (x, n) = match self.shape {
+            Shape::Slab { thickness, .. } if far => (Vec3::new(r as f32, 0.0, -thickness), Vec3::NEG_Z),
+            Shape::Slab { .. } => (Vec3::new(r as f32, 0.0, 0.0), Vec3::Z),
+            Shape::Ball { radius } => {
+                let half = (0.5 * r as f32 / radius).min(1.0);
+                let along = r as f32 * (1.0 - half * half).sqrt();
+                let x = Vec3::new(along, 0.0, -(r as f32) * half);
+                (x, (x + Vec3::Z * radius).normalize())
+            }
+        };
+        Exit { x, n, w: n }
+    }
+
+    /// Flux through the rings of both faces.
+    fn flux(&self, s_d: impl Fn(&Exit) -> f64, exitance: f64) -> [[f64; RINGS]; 2] {
+        let largest = match self.shape {
+            Shape::Ball { radius } => 2.0 * f64::from(radius),
+            Shape::Slab { .. } => f64::INFINITY,
+        };
+        let mut flux = [[0.0; RINGS]; 2];
+        for (face, flux) in flux.iter_mut().enumerate() {
+            if face == 1 && matches!(self.shape, Shape::Ball { .. }) {
+                break;
+            }
+            for (i, flux) in flux.iter_mut().enumerate() {
+                let (from, to) = (if i == 0 { 0.0 } else { ring_end(i - 1) }, ring_end(i).min(largest));
+                if from >= to {
+                    break;
+                }
+                // Midpoints: even in the area of the first ring, even in ln r beyond.
+                let steps = if i + 1 == RINGS { 60 } else { 12 };
+                for k in 0..steps {
+                    let at = (f64::from(k) + 0.5) / f64::from(steps);
+                    let (r, area) = if i == 0 {
+                        (to * at, 2.0 * PI * to * at * to / f64::from(steps))
+                    } else {
+                        let r = from * (to / from).powf(at);
+                        (r, 2.0 * PI * r * r * (to / from).ln() / f64::from(steps))
+                    };
+                    // The ring of chord r on a sphere has the area of that on a plane.
+                    *flux += area * exitance * s_d(&self.exit(face == 1, r));
+                }
+            }
+        }
+        flux
+    }
+}
+
+struct Evaluate<'a>(&'a Rings, f64);
+
+impl ModelVisitor for Evaluate<'_> {
+    type Out = ([[f64; RINGS]; 2], bool);
+    fn visit<B: Bssrdf>(self, model: &B) -> Self::Out {
+        let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::NEG_Z };
+        let flux = self.0.flux(|exit| f64::from(model.eval(&entry, exit)[0]), self.1);
+        (flux, model.claims().first_order)
+    }
+}
+
+/// In the order of the columns.
+fn models(shape: Shape, medium: &Medium) -> Vec<Option<Model>> {
+    let thickness = match shape {
+        Shape::Slab { thickness, half_width } if thickness < half_width => Some(thickness),
+        Shape::Slab { .. } => None,
+        Shape::Ball { radius } => Some(2.0 * radius),
+    };
+    let plain = |name: ModelName| Some(Model::new(name, medium, true));
+    vec![
+        plain(ModelName::Standard),
+        plain(ModelName::Better),
+        plain(ModelName::Beam),
+        plain(ModelName::Directional),
+        Some(Model::Directional(DirectionalDipole::new(medium, true))),
+        plain(ModelName::Normalised),
+        thickness.and_then(|t| Model::with_thickness(ModelName::Slab, medium, Some(t), true).ok()),
+    ]
+}
+
+fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) {
+    let exitance = PI * FresnelMoments::new(medium.eta.into()).four_c_phi_outside;
+    let all: f64 = truth.iter().flatten().flatten().map(|s| s.mean(paths).0).sum();
+    let straight: f64 = truth.iter().flatten().map(|ring| ring[0].mean(paths).0).sum();
+    let (rings, mut row, mut largest) = (Rings { shape }, String::new(), 0.0_f64);
+    for model in models(shape, medium) {
+        let Some(model) = model else {
+            row += ",,";
+            continue;
+        };
+        let (flux, first) = model.visit(Evaluate(&rings, exitance));
+        let (mut wrong, mut total, mut variance) = (straight, -straight, 0.0);
+        for (flux, truth) in flux.iter().flatten().zip(truth.iter().flatten()) {
+            let [_, one, more] = truth.map(|s| s.mean(paths));
+            // Exact single scattering stands beside models that leave it out.
+            let difference = flux - more.0 - if first { one.0 } else { 0.0 };
+            wrong += difference.abs();
+            total += difference;
+            variance += more.1 + if first { one.1 } else { 0.0 };
+        }
+        row += &format!(",{:.3},{:.3}", total / all, wrong / all);
+        largest = largest.max(variance.sqrt() / all);
+    }
+    println!("{head},{largest:.3}{row}");
+}
+
+fn main() {
+    let set = |name: &str| std::env::var(name).ok();
+    let paths: u64 = set("MARMOR_BENCH_PATHS").and_then(|n| n.parse().ok()).unwrap_or(100_000);
+    let only = set("MARMOR_BENCH_ONLY").unwrap_or_default();
+    let mut shapes = vec![("half", 0.0, Shape::Slab { thickness: 400.0, half_width: 400.0 })];
+    shapes.extend(SIZES.map(|h| ("slab", h, Shape::Slab { thickness: h, half_width: 400.0 })));
+    shapes.extend(SIZES.map(|r| ("ball", r, Shape::Ball { radius: r })));
+    let columns = ["standard", "better", "beam", "directional", "calibrated", "normalised", "slab"]
+        .map(|model| format!(",{model}_total,{model}_l1"));
+    println!("eta,g,shape,size,alpha_prime,standard_error{}", columns.concat());
+    let medium = |albedo: f64, g: f64, eta: f64| {
+        // σ_t′ = 1: σ_t (1 - α g) = 1.
+        let sigma_t = 1.0 / (1.0 - albedo * g);
+        let (s, a) = (albedo * sigma_t, (1.0 - albedo) * sigma_t);
+        Medium::unreduced(Rgb::splat(s as f32), Rgb::splat(a as f32), g, eta as f32).unwrap()
+    };
+    for (eta, g) in [(1.3, 0.0), (1.3, 0.8), (1.5, 0.0), (1.0, 0.0)] {
+        for &(name, size, shape) in &shapes {
+            let head = format!("{eta},{g},{name},{size}");
+            if !head.starts_with(&only) {
+                continue;
+            }
+            let seed = size as u64 * 100 + (eta * 10.0) as u64;
+            if g == 0.0 {
+                let factors = ALBEDOS.map(|a| a / TRACED);
+                let truths = trace(shape, medium(TRACED, g, eta), &factors, paths, seed);
+                for (albedo, truth) in ALBEDOS.iter().zip(&truths) {
+                    report(&format!("{head},{albedo}"), shape, &medium(*albedo, g, eta), truth, paths as f64);
+                }
+            } else {
+                for alpha_prime in [0.5, 0.7, 0.9, 0.97, 0.99, 0.999] {
+                    // α′ = α (1 - g) / (1 - α g).
+                    let medium = medium(alpha_prime / (1.0 - g + alpha_prime * g), g, eta);
+                    let truth = trace(shape, medium, &[1.0], paths / 2, seed);
+                    report(&format!("{head},{alpha_prime}"), shape, &medium, &truth[0], (paths / 2) as f64);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,281 @@
+//! How wrong a model is expected to be at a place of a body: a table measured against paths through the medium, and the
+//! rule that reads it. `benches/validity.rs` makes the table; docs/models.md has it in words.
+
+use super::ModelName;
+use crate::optics::ChannelOptics;
+use std::sync::OnceLock;
+
+/// Errors of a model at a place, relative to all light that leaves after a narrow beam has entered there.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExpectedError {
+    /// Of the total, signed: above 0 the model is too bright.
+    pub total: f64,
+    /// Of the distribution: the sum of absolute errors over all rings around the beam, at least |`total`|. Light that
+    /// passes unscattered is in it, for no model has it.
+    pub distribution: f64,
+}
+
+/// What decides it: one channel of a medium, and the shape around a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Reduced albedo, 0 to 1.
+    pub alpha_prime: f64,
+    /// Mean cosine of the phase function.
+    pub g: f64,
+    /// n_inside / n_outside.
+    pub eta: f64,
+    /// Way along the inward normal to the other side [transport mean free paths]; may be infinite.
+    pub thickness: f64,
+    /// Mean curvature [1 / transport mean free path]: 1 / radius on a ball, 0 on a plane, below 0 in a hollow.
+    pub curvature: f64,
+}
+
+impl Place {
+    /// A place of thickness [unit] and mean curvature [1/unit] in one channel of a medium.
+    pub fn new(optics: &ChannelOptics, eta: f64, thickness: f64, curvature: f64) -> Self {
+        let path = optics.transport_mean_free_path;
+        Self {
+            alpha_prime: optics.alpha_prime,
+            g: optics.g,
+            eta,
+            thickness: thickness / path,
+            curvature: curvature * path,
+        }
+    }
+}
+
+/// The models of the table, in the order of its columns: a name, and whether it is scaled to the true albedo.
+const MODELS: [(ModelName, bool); 7] = [
+    (ModelName::Standard, false),
+    (ModelName::Better, false),
+    (ModelName::Beam, false),
+    (ModelName::Directional, false),
+    (ModelName::Directional, true),
+    (ModelName::Normalised, false),
+    (ModelName::Slab, false),
+];
+
+/// Sizes of slabs and balls in the table [transport mean free paths]; a half space is the end of both rows.
+const SIZES: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
+/// Refractive indices of the rows with g = 0.
+const ETAS: [f64; 3] = [1.0, 1.3, 1.5];
+/// The index and the mean cosine of the other rows.
+const FORWARD: (f64, f64) = (1.3, 0.8);
+
+/// The error of `model` (of `auto` that of `beam`) at `place`; `calibrated` is about `directional` alone.
+///
+/// The table has slabs of thickness H, balls of radius R and the half space. A place of thickness H and mean curvature
+/// 1/R is read as
+///
+///   R ≤ H/2   the ball of radius R
+///   R > H/2   w ball(H/2) + (1 - w) slab(H), w = H / 2R
+///
+/// so that a ball gives the row of its ball, a sheet that of its slab, a plane that of the half space, and what is between
+/// them lies between. Hollows count as flat. Between rows: linear in ln(1 - α′), in ln(size) up to 50 transport mean free
+/// paths and in 1/size beyond, in η and in g. Outside of α′ 0.3 .. 0.999, η 1 .. 1.5, g 0 .. 0.95 and below a size
+/// of 1 the nearest end counts.
+pub fn expected_error(model: ModelName, calibrated: bool, place: &Place) -> ExpectedError {
+    let model = if model == ModelName::Auto { ModelName::Beam } else { model };
+    let calibrated = calibrated && model == ModelName::Directional;
+    let column = MODELS.iter().position(|m| *m == (model, calibrated)).unwrap_or(0);
+    let table = table();
+    let g = if place.g.is_finite() { place.g.clamp(0.0, 0.95) } else { 0.0 };
+    let eta = place.eta.clamp(ETAS[0], ETAS[ETAS.len() - 1]);
+    let i = if eta < ETAS[1] { 0 } else { 1 };
+    let at = (eta - ETAS[i]) / (ETAS[i + 1] - ETAS[i]);
+    let read = |medium: usize| table.media[medium].shape(column, place);
+    let mut error = mix(read(i), read(i + 1), at);
+    if g > 0.0 {
+        let (plain, forward) = (read(1), read(ETAS.len()));
+        let more = g / FORWARD.1;
+        error.total += more * (forward.total - plain.total);
+        error.distribution += more * (forward.distribution - plain.distribution);
+        error.distribution = error.distribution.max(error.total.abs()).max(0.0);
+    }
+    error
+}
+
+fn mix(a: ExpectedError, b: ExpectedError, at: f64) -> ExpectedError {
+    ExpectedError {
+        total: a.total + at * (b.total - a.total),
+        distribution: a.distribution + at * (b.distribution - a.distribution),
+    }
+}
+
+/// Rows of one η and g.
+#[derive(Default)]
+struct Shapes {
+    /// α′, ascending.
+    albedos: Vec<f64>,
+    /// By column, then shape: the half space, slabs, balls; then albedo.
+    errors: Vec<Vec<Vec<ExpectedError>>>,
+}
+
+/// One for each of [`ETAS`], and [`FORWARD`].
+struct Table {
+    media: Vec<Shapes>,
+}
+
+impl Shapes {
+    fn shape(&self, column: usize, place: &Place) -> ExpectedError {
+        let thickness = if place.thickness.is_nan() { f64::INFINITY } else { place.thickness.max(0.0) };
+        let curvature = if place.curvature.is_finite() { place.curvature.max(0.0) } else { 0.0 };
+        let weight = 0.5 * thickness * curvature;
+        let slab = |h: f64| self.sized(column, 1, h, place.alpha_prime);
+        let ball = |r: f64| self.sized(column, 1 + SIZES.len(), r, place.alpha_prime);
+        if curvature == 0.0 {
+            slab(thickness)
+        } else if weight >= 1.0 {
+            ball(1.0 / curvature)
+        } else {
+            mix(slab(thickness), ball(0.5 * thickness), weight)
+        }
+    }
+
+    /// Of the rows that begin at `first`, the size `size`.
+    fn sized(&self, column: usize, first: usize, size: f64, alpha_prime: f64) -> ExpectedError {
+        let row = |i: usize| self.albedo(column, if i < SIZES.len() { first + i } else { 0 }, alpha_prime);
+        let last = SIZES.len() - 1;
+        if size <= SIZES[0] {
+            return row(0);
+        }
+        if size >= SIZES[last] {
+            return mix(row(last + 1), row(last), SIZES[last] / size);
+        }
+        let i = SIZES.iter().rposition(|&s| s <= size).unwrap_or(0);
+        mix(row(i), row(i + 1), (size / SIZES[i]).ln() / (SIZES[i + 1] / SIZES[i]).ln())
+    }
+
+    fn albedo(&self, column: usize, shape: usize, alpha_prime: f64) -> ExpectedError {
+        let (errors, albedos) = (&self.errors[column][shape], &self.albedos);
+        let i = albedos.partition_point(|&a| a <= alpha_prime);
+        if i == 0 {
+            return errors[0];
+        }
+        if i == albedos.len() {
+            return errors[i - 1];
+        }
+        let depth = |a: f64| (1.0 - a).ln();
+        let at = (depth(alpha_prime) - depth(albedos[i - 1])) / (depth(albedos[i]) - depth(albedos[i - 1]));
+        mix(errors[i - 1], errors[i], at)
+    }
+}
+
+fn table() -> &'static Table {
+    static TABLE: OnceLock<Table> = OnceLock::new();
+    TABLE.get_or_init(|| read(include_str!("expected.csv")))
+}
+
+/// Columns before those of the models.
+const KEYS: usize = 6;
+
+/// The file is our own: a cell that is no number is a model that does not exist there, and counts as wrong by all.
+fn read(text: &str) -> Table {
+    let media = ETAS.map(|eta| (eta, 0.0)).into_iter().chain([FORWARD]);
+    let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let number = |row: &[&str], i: usize| row.get(i).and_then(|c| c.parse::<f64>().ok());
+    let shape = |row: &[&str]| {
+        let size = SIZES.iter().position(|&s| number(row, 3) == Some(s)).unwrap_or(0);
+        match row.get(2) {
+            Some(&"slab") => 1 + size,
+            Some(&"ball") => 1 + SIZES.len() + size,
+            _ => 0,
+        }
+    };
+    let of = |(eta, g): (f64, f64)| {
+        let mine = || rows.iter().filter(move |row| (number(row, 0), number(row, 1)) == (Some(eta), Some(g)));
+        let mut albedos: Vec<f64> = mine().filter_map(|row| number(row, 4)).collect();
+        albedos.sort_by(f64::total_cmp);
+        albedos.dedup();
+        let nothing = ExpectedError { total: -1.0, distribution: 1.0 };
+        let mut errors = vec![vec![vec![nothing; albedos.len()]; 1 + 2 * SIZES.len()]; MODELS.len()];
+        for row in mine() {
+            let Some(albedo) = albedos.iter().position(|&a| number(row, 4) == Some(a)) else { continue };
+            for (column, errors) in errors.iter_mut().enumerate() {
+                let cell = |k: usize| number(row, KEYS + 2 * column + k);
+                if let (Some(total), Some(distribution)) = (cell(0), cell(1)) {
+                    errors[shape(row)][albedo] = ExpectedError { total, distribution };
+                }
+            }
+        }
+        // A slab so thick that it is a half space is the standard dipole.
+        errors[6][0] = errors[0][0].clone();
+        Shapes { albedos, errors }
+    };
+    Table { media: media.map(of).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn place(alpha_prime: f64, thickness: f64, curvature: f64) -> Place {
+        Place { alpha_prime, g: 0.0, eta: 1.3, thickness, curvature }
+    }
+
+    /// Cells of the file, by the words that begin its row.
+    fn row(head: &str) -> Vec<f64> {
+        let line = include_str!("expected.csv").lines().find(|l| l.starts_with(head)).unwrap();
+        line.split(',').skip(KEYS).map(|c| c.parse().unwrap_or(f64::NAN)).collect()
+    }
+
+    #[test]
+    fn rows_of_the_table_are_given_back() {
+        for (head, place) in [
+            ("1.3,0,half,0,0.9,", place(0.9, f64::INFINITY, 0.0)),
+            ("1.3,0,slab,5,0.999,", place(0.999, 5.0, 0.0)),
+            ("1.3,0,ball,2,0.7,", place(0.7, 4.0, 0.5)),
+            ("1.3,0,ball,50,0.99,", place(0.99, 1000.0, 0.02)),
+            ("1.5,0,slab,10,0.97,", Place { eta: 1.5, ..place(0.97, 10.0, -3.0) }),
+            ("1,0,half,0,0.5,", Place { eta: 0.8, ..place(0.5, f64::NAN, f64::NAN) }),
+            ("1.3,0.8,ball,10,0.9,", Place { g: 0.8, ..place(0.9, 20.0, 0.1) }),
+        ] {
+            let cells = row(head);
+            for (k, (model, calibrated)) in MODELS.into_iter().enumerate() {
+                if cells[2 * k].is_nan() {
+                    continue;
+                }
+                let error = expected_error(model, calibrated, &place);
+                let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+                assert!(
+                    close(error.total, cells[2 * k]) && close(error.distribution, cells[2 * k + 1]),
+                    "{head} {error:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn every_row_is_there_and_no_model_is_wrong_by_less_than_its_total() {
+        let table = table();
+        assert_eq!(table.media.iter().map(|m| m.albedos.len()).collect::<Vec<_>>(), [9, 9, 9, 6]);
+        for medium in &table.media {
+            for (k, shapes) in medium.errors.iter().enumerate() {
+                for (shape, errors) in shapes.iter().enumerate() {
+                    for e in errors {
+                        assert!(e.distribution + 2e-3 >= e.total.abs(), "{k} {shape} {e:?}");
+                        // The slab of one transport mean free path is the only thing that does not exist.
+                        assert!(e.total != -1.0 || k == 6 && (shape == 1), "{k} {shape}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn between_rows_the_error_has_no_steps() {
+        for model in [ModelName::Standard, ModelName::Beam] {
+            let mut last = None;
+            for i in 0..4000 {
+                let thickness = 10f64.powf(f64::from(i) / 1000.0 - 1.0);
+                let error = expected_error(model, false, &place(0.95, thickness, 0.05)).distribution;
+                assert!(last.is_none_or(|l: f64| (l - error).abs() < 0.02), "{thickness}: {last:?} {error}");
+                last = Some(error);
+            }
+            for far in [1e6, f64::INFINITY] {
+                let half = expected_error(model, false, &place(0.95, f64::INFINITY, 0.0)).distribution;
+                assert!((expected_error(model, false, &place(0.95, far, 1e-9)).distribution - half).abs() < 1e-4);
+            }
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! `--layers`: what an EXR holds beside the picture, and where each layer comes from.
+
+use super::setup::{Method, Prepared};
+use marmor::film::{Film, Image, Layer, variance};
+use marmor::integrator::{FirstOrder, View};
+use marmor::render::{self, Job, Seen, first_hit};
+use marmor::{Error, Result};
+use std::sync::Mutex;
+use std::sync::atomic::AtomicBool;
+
+/// What an EXR may hold beside the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum LayerName {
+    /// Variance of each pixel's mean
+    Variance,
+    /// Reflectance of what the camera sees first
+    Albedo,
+    /// Shading normal there, towards the camera
+    #[value(name = "N")]
+    Normal,
+    /// Its place in the scene's coordinates
+    #[value(name = "P")]
+    Place,
+    /// Its distance along the direction of view
+    #[value(name = "Z")]
+    Depth,
+    /// The part of the picture that is light scattered once, beside models that leave it out
+    Single,
+    /// Expected error of the material's model there
+    Validity,
+}
+
+impl LayerName {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Variance => "variance",
+            Self::Albedo => "albedo",
+            Self::Normal => "N",
+            Self::Place => "P",
+            Self::Depth => "Z",
+            Self::Single => "single",
+            Self::Validity => "validity",
+        }
+    }
+
+    /// The name of the layer in a file, and of its channels.
+    fn channels(self) -> (&'static str, &'static [&'static str]) {
+        match self {
+            Self::Variance => ("Variance", &["R", "G", "B"]),
+            Self::Albedo | Self::Single => (self.name(), &["R", "G", "B"]),
+            Self::Normal | Self::Place => (self.name(), &["X", "Y", "Z"]),
+            Self::Depth => ("", &["Z"]),
+            Self::Validity => (self.name(), &["Y", "thickness", "curvature"]),
+        }
+    }
+
+    fn seen(self) -> Option<Seen> {
+        match self {
+            Self::Albedo => Some(Seen::Albedo),
+            Self::Normal => Some(Seen::Normal),
+            Self::Place => Some(Seen::Place),
+            Self::Depth => Some(Seen::Depth),
+            Self::Validity => Some(Seen::Validity),
+            Self::Variance | Self::Single => None,
+        }
+    }
+}
+
+/// Makes layers. Those of the film's sums need the film alone, others the scene too.
+pub struct Layers<'a> {
+    names: Vec<LayerName>,
+    scene: Option<(&'a Prepared, View<'a>)>,
+    /// What does not change from pass to pass.
+    made: Mutex<Vec<(LayerName, Image)>>,
+}
+
+impl<'a> Layers<'a> {
+    /// The layers `names`, each once, of a film whose scene is at hand; without it layers that need it are refused.
+    ///
+    /// # Errors
+    /// Usage for a layer that cannot be made, before any time is spent.
+    pub fn new(names: &[LayerName], scene: Option<(&'a Prepared, View<'a>)>) -> Result<Self> {
+        let mut once: Vec<LayerName> = Vec::new();
+        for name in names {
+            if !once.contains(name) {
+                once.push(*name);
+            }
+        }
+        for name in &once {
+            let name_text = name.name();
+            match (name, &scene) {
+                (LayerName::Variance, _) => {}
+                (_, None) => {
+                    return Err(Error::usage(format!(
+                        "--layers {name_text}: film files hold sums of the picture alone; ask for it where the scene is: \
+                         `marmor render SCENE --spp 1 --layers {name_text}` gives the same layer{}",
+                        if *name == LayerName::Single { ", but for its noise" } else { "" }
+                    )));
+                }
+                (LayerName::Single, Some((prepared, _)))
+                    if !matches!(prepared.method, Method::Subsurface(_))
+                        || prepared.file.method.single == Some(false) =>
+                {
+                    return Err(Error::usage(
+                        "--layers single is a part of the method `subsurface`, unless `single = false`; with \
+                             `volume_path`, ask for -D method.orders='\"1\"'",
+                    ));
+                }
+                _ => {}
+            }
+        }
+        Ok(Self { names: once, scene, made: Mutex::new(Vec::new()) })
+    }
+
+    /// All layers of `film`.
+    ///
+    /// # Errors
+    /// Usage for a variance of fewer than two samples.
+    pub fn of(&self, film: &Film) -> Result<Vec<Layer>> {
+        self.names.iter().map(|&name| self.layer(name, film)).collect()
+    }
+
+    fn layer(&self, name: LayerName, film: &Film) -> Result<Layer> {
+        let image = match (name, name.seen(), &self.scene) {
+            (_, Some(what), Some((_, view))) => self.once(name, || first_hit(*view, film.window(), what)),
+            (LayerName::Single, _, Some((prepared, view))) => single(prepared, *view, film)?,
+            _ => variance(film).ok_or_else(|| Error::usage("--layers variance needs at least 2 samples per pixel"))?,
+        };
+        let (layer, channels) = name.channels();
+        Ok(Layer { name: layer.into(), channels, image })
+    }
+
+    /// The picture made before, or by `make`.
+    fn once(&self, name: LayerName, make: impl FnOnce() -> Image) -> Image {
+        let mut made = self.made.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some((_, image)) = made.iter().find(|(n, _)| *n == name) {
+            return image.clone();
+        }
+        let image = make();
+        made.push((name, image.clone()));
+        image
+    }
+}
+
+/// Light scattered once, of the very passes that are in `film`: rendered again by the same numbers.
+fn single(prepared: &Prepared, view: View<'_>, film: &Film) -> Result<Image> {
+    let method = FirstOrder::new(view.scene, prepared.seed)?;
+    let mut whole: Option<Film> = None;
+    for range in film.ranges().iter().filter(|r| !r.is_empty()) {
+        let mut part = Film::new(film.resolution(), film.window())?.starting_at(range.start);
+        let go_on = AtomicBool::new(false);
+        let job = Job { seed: prepared.seed, passes: Some(range.end), time: None, cancel: &go_on };
+        render::run(&method, view, &job, &mut part, &mut [])?;
+        match &mut whole {
+            Some(whole) => whole.join(&part)?,
+            None => whole = Some(part),
+        }
+    }
+    whole.map(|film| film.image()).ok_or_else(|| Error::usage("--layers single: the film has no passes"))
+}
