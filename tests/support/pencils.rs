@@ -67,7 +67,7 @@ impl Body {
             camera,
             objects: vec![Object { name: "body".into(), mesh, material: 0, findings: Findings::default() }],
             materials: vec![Material { name: "body".into(), surface: Surface::Translucent(translucent) }],
-            environment: Rgb::BLACK,
+            environment: Rgb::BLACK.into(),
             warnings: Vec::new(),
         };
         Self { shape, scene }
