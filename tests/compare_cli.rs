@@ -107,3 +107,23 @@ fn a_model_against_itself_shows_no_bias() {
     assert!((cells[1] - 1.0).abs() < 0.05, "{csv}");
     assert!(cells[4].abs() < 5.0 * cells[5], "bias {} within {}: {told}", cells[4], cells[5]);
 }
+
+#[test]
+fn a_stored_film_is_a_truth_with_noise() {
+    let folder = folder();
+    let run = |arguments: &[&str]| {
+        let output = marmor(folder.path(), arguments);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    run(&["render", "scene.toml", "-q", "--model", "standard", "--seed", "9", "--spp", "16", "-o", "truth.film"]);
+    let compare = ["compare", "scene.toml", "--models", "standard,better", "--reference", "truth.film", "--time-budget"];
+    run(&[&compare[..], &["300ms", "-q", "-o", "out"]].concat());
+    let csv = fs::read_to_string(folder.path().join("out/compare.csv")).unwrap();
+    assert!(csv.starts_with("# scene; reference: truth.film, 16 samples; its noise: relMSE ") && !csv.contains("0.000e0"));
+    let number = |row: usize, column: usize| -> f64 {
+        csv.lines().nth(2 + row).unwrap().split(',').nth(column).unwrap().parse().unwrap()
+    };
+    // `standard` against itself shows no bias; `better` is some 10 % brighter.
+    assert!(number(0, 5).abs() < 5.0 * number(0, 6), "{csv}");
+    assert!((3e-3..0.1).contains(&number(1, 5)), "{csv}");
+}

@@ -67,6 +67,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
 struct Truth {
     text: String,
     image: Image,
+    /// Of its even and odd passes, where they are known.
+    halves: Option<[Image; 2]>,
     noise: f64,
 }
 
@@ -96,7 +98,8 @@ fn compare(args: &Args) -> Result<ExitCode> {
             race(&mut runner, reference_budget, &cancel, |_, r| r.follow())?;
             let [runner] = runner;
             let noise = runner.own.last().and_then(|e| e.relmse).map_or(0.0, |e| e.value);
-            Truth { text: spec.to_owned(), image: runner.film.image(), noise }
+            let halves = runner.film.half_images();
+            Truth { text: spec.to_owned(), image: runner.film.image(), halves, noise }
         }
     };
     say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
@@ -117,9 +120,10 @@ fn stored(path: &Path) -> Result<Truth> {
     if Format::of(path).is_ok_and(|format| format == Format::Film) {
         let film = Checkpoint::read(path)?.film;
         let noise = SelfError::new().measure(&film).and_then(|e| e.relmse).map_or(0.0, |e| e.value);
-        return Ok(Truth { text: format!("{text}, {} samples", film.passes()), image: film.image(), noise });
+        let text = format!("{text}, {} samples", film.passes());
+        return Ok(Truth { text, image: film.image(), halves: film.half_images(), noise });
     }
-    Ok(Truth { text, image: Image::read_exr(path)?, noise: 0.0 })
+    Ok(Truth { text, image: Image::read_exr(path)?, halves: None, noise: 0.0 })
 }
 
 /// Longest side of a picture on the page [pixels].
@@ -159,6 +163,10 @@ fn write(
             seconds: runner.seconds.total(),
             samples: runner.film.passes(),
             mean_ratio: comparison.mean_ratio,
+            squared_bias: runner
+                .film
+                .half_images()
+                .and_then(|halves| metrics::squared_bias(&halves, &truth.image, truth.halves.as_ref())),
             measured: comparison.whole.relmse.map_or(0.0, |e| e.value),
             noise: point.map_or(0.0, |p| p.own),
             width: point.and_then(|p| p.width),
@@ -176,6 +184,7 @@ fn write(
         scene: scene_name(&args.scene),
         reference: truth.text.clone(),
         reference_noise: truth.noise,
+        reference_halves: truth.halves.is_some(),
         models,
         range,
         footnotes,

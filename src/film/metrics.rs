@@ -146,6 +146,28 @@ pub fn from_halves(film: &Film, interior: Option<&[bool]>) -> Option<Errors> {
     })
 }
 
+/// mean((x_e - r_e) (x_o - r_o) / (r² + 0.01 mean(r)²)) over pixels and channels, from the independent halves e and o of a
+/// picture x and of its reference r: the squared relative bias. The noise of neither is in its expectation, and a bright
+/// speck, which is in one half alone, does not count squared. A reference without halves stands for both, and leaves its
+/// noise in. None where the reference is black, or the sizes differ.
+pub fn squared_bias(halves: &[Image; 2], reference: &Image, reference_halves: Option<&[Image; 2]>) -> Option<f64> {
+    let r = &reference.pixels;
+    let [re, ro] = reference_halves.map_or([r, r], |[e, o]| [&e.pixels, &o.pixels]);
+    let [xe, xo] = [&halves[0].pixels, &halves[1].pixels];
+    if [xe, xo, re, ro].iter().any(|p| p.len() != r.len()) {
+        return None;
+    }
+    let used = |i: &usize| [xe, xo, re, ro, r].iter().all(|p| p[*i].is_finite());
+    let pixels: Vec<usize> = (0..r.len()).filter(used).collect();
+    let count = (3 * pixels.len()).max(1) as f64;
+    let floor = 0.01 * (pixels.iter().flat_map(|&i| r[i].0).map(f64::from).sum::<f64>() / count).powi(2);
+    let product = |i: usize, c: usize| {
+        let difference = |x: &[Rgb], r: &[Rgb]| f64::from(x[i][c]) - f64::from(r[i][c]);
+        difference(xe, re) * difference(xo, ro) / (f64::from(r[i][c]).powi(2) + floor)
+    };
+    (floor > 0.0).then(|| pixels.iter().map(|&i| (0..3).map(|c| product(i, c)).sum::<f64>()).sum::<f64>() / count)
+}
+
 fn errors(window: Window, x: &[Rgb], r: &[Rgb], scale: f64, used: &[bool]) -> Errors {
     errors_by(window, r, scale, used, |i, c| f64::from(x[i][c]) - f64::from(r[i][c]))
 }
@@ -273,6 +295,24 @@ pub fn student_975(freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::hash;
+
+    /// A picture 1.2 times its reference, all four halves with noise of 50 %: the square of 0.2 comes out.
+    #[test]
+    fn the_squared_bias_is_free_of_noise() {
+        let noise = |seed: u64, x: u32, y: u32| (hash(seed << 32 | u64::from(y * 200 + x)) >> 40) as f32 / 16_777_216.0 - 0.5;
+        let half = |seed, level: f32| Image::from_fn([200, 200], |x, y| Rgb::splat(level * (1.0 + noise(seed, x, y))));
+        let (x, r) = ([half(1, 1.2), half(2, 1.2)], [half(3, 1.0), half(4, 1.0)]);
+        let reference = Image::from_fn([200, 200], |_, _| Rgb::splat(1.0));
+        let expected = 0.04 / 1.01;
+        // A product of two differences of variance (1.44 + 1) / 12 about 0.2, 40000 of them: standard error 0.0013.
+        let found = squared_bias(&x, &reference, Some(&r)).unwrap();
+        assert!((found - expected).abs() < 6.0 * 0.0013, "{found}");
+        // Taken for free of noise, the reference's own stays in if both halves are told from the same picture.
+        let same = squared_bias(&x, &r[0], None).unwrap();
+        assert!(same > expected + 0.05, "{same}");
+        assert!(squared_bias(&x, &half(5, 0.0), None).is_none());
+    }
 
     #[test]
     fn student_factors_are_those_of_the_tables() {

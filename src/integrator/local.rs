@@ -45,7 +45,8 @@ impl LocalShape {
     pub fn at(&self, view: View<'_>, triangle: u32, u: f32, v: f32) -> Local {
         let mesh = &view.scene.objects[self.object as usize].mesh;
         let at = mesh.point(triangle, u, v);
-        let inwards: Vec3 = -at.n_geometric;
+        // The interpolated normal: along rims the facets look anywhere.
+        let inwards: Vec3 = -at.n;
         let thickness = view.rays.closest(&Ray::new(at.leave(inwards), inwards)).map_or(f32::INFINITY, |hit| hit.t);
         Local { thickness, curvature: self.curvature.at(mesh, triangle, u, v) }
     }

@@ -51,6 +51,9 @@ pub struct Trustworthiness {
     pub trusted_from: Option<f64>,
 }
 
+/// Wrong on more than this share of the area, and no model is to be trusted.
+const MOSTLY: f64 = 0.5;
+
 /// Candidates beside the material's own model.
 const CANDIDATES: [(ModelName, bool); 4] = [
     (ModelName::Beam, false),
@@ -126,25 +129,24 @@ impl Trustworthiness {
             .map(|m| format!("`{}` {}{}", m.model, percent(m.distribution), if m.chosen { " (chosen)" } else { "" }))
             .collect();
         let best = &self.models[0];
+        let wrong = || {
+            let share = if best.beyond > 0.995 { "everywhere".into() } else { format!("on {} of the area", percent(best.beyond)) };
+            format!("`{}` errs by more than {} {share}", best.model, percent(self.tolerance))
+        };
         let verdict = match self.trusted_from {
             _ if best.beyond < 0.005 => format!("trust `{}`", best.model),
-            Some(from) => format!(
-                "trust `{}` where the body is thick; it errs by more than {} on {} of the area (flat parts thinner than {from:.0} \
-                 transport mean free paths): there take --method volume_path",
+            Some(from) if best.beyond < MOSTLY => format!(
+                "trust `{}` where the body is thick; {} (sheets thinner than {from:.0} transport mean free paths, and what bends \
+                 as sharply): there take --method volume_path",
                 best.model,
-                percent(self.tolerance),
-                percent(best.beyond)
+                wrong()
             ),
-            None => format!(
-                "trust none: even `{}` errs by more than {} on {} of the area, however thick; take --method volume_path",
-                best.model,
-                percent(self.tolerance),
-                percent(best.beyond)
-            ),
+            Some(_) => format!("trust none, the body is too thin: even {}; take --method volume_path", wrong()),
+            None => format!("trust none, whatever the thickness: even {}; take --method volume_path", wrong()),
         };
         format!(
             "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). Expected to \
-             be wrong by, mean over the area: {}. So {verdict}",
+             be wrong by, where light is not far from its entry, mean over the area: {}. So {verdict}",
             self.object,
             self.material,
             listed.join(", ")

@@ -18,7 +18,10 @@ pub struct Compared {
     pub mean_ratio: [Option<Estimate>; 3],
     /// relMSE against the reference as it is.
     pub measured: f64,
-    /// Of it, the picture's own noise, told by its halves.
+    /// The square of its bias, from independent halves of picture and reference: see
+    /// [`crate::film::metrics::squared_bias`]; with a reference without halves its noise is still in.
+    pub squared_bias: Option<f64>,
+    /// The picture's own noise, told by its halves.
     pub noise: f64,
     /// Half of the 95 % interval of log(noise).
     pub width: Option<f64>,
@@ -33,6 +36,8 @@ pub struct ModelComparison {
     pub reference: String,
     /// relMSE of its noise.
     pub reference_noise: f64,
+    /// Whether its halves are known, so that its noise is not in `squared_bias`.
+    pub reference_halves: bool,
     /// In the order asked.
     pub models: Vec<Compared>,
     /// Where the colours of the relative difference end.
@@ -44,7 +49,11 @@ pub struct ModelComparison {
 impl ModelComparison {
     /// relMSE without the noise of picture and reference, and half of its 95 % interval: the square of the bias.
     pub fn bias(&self, model: &Compared) -> (f64, f64) {
-        let value = model.measured - model.noise - self.reference_noise;
+        let value = match model.squared_bias {
+            Some(value) if self.reference_halves => value,
+            Some(value) => value - self.reference_noise,
+            None => model.measured - model.noise - self.reference_noise,
+        };
         let width = model.width.unwrap_or(1.0).max(0.3); // as in `Convergence::floor`
         let cross = value.max(0.0) * (model.noise + self.reference_noise);
         let parts = [width * model.noise, 0.3 * self.reference_noise, 0.3 * cross.sqrt()];
@@ -66,8 +75,9 @@ impl ModelComparison {
             let (value, half) = self.bias(best);
             out.push(if value > half {
                 format!(
-                    "{} comes nearest to the reference: wrong by {rms:.1} % (root of the relMSE without noise).",
-                    best.name
+                    "{} comes nearest to the reference: wrong by {rms:.1} % (root of the relMSE without noise), {}.",
+                    best.name,
+                    brightness(best)
                 )
             } else {
                 format!(
@@ -78,13 +88,7 @@ impl ModelComparison {
         }
         for model in order.iter().skip(1) {
             let rms = self.bias(model).0.max(0.0).sqrt() * 100.0;
-            let mean = model.mean_ratio.iter().flatten().map(|e| e.value).sum::<f64>() / 3.0;
-            let side = if mean > 1.0 { "brighter" } else { "darker" };
-            out.push(format!(
-                "{}: wrong by {rms:.1} %, {:.1} % {side} in the mean.",
-                model.name,
-                100.0 * (mean - 1.0).abs()
-            ));
+            out.push(format!("{}: wrong by {rms:.1} %, {}.", model.name, brightness(model)));
         }
         out
     }
@@ -154,13 +158,21 @@ impl ModelComparison {
         );
         page.text(
             "Mean: of the picture over that of the reference. Noise is told by the two independent halves of each render; \
-             bias is what is left without the noise of picture and reference.",
+             the bias is the mean product of what the two halves are wrong by, to which noise adds nothing.",
         );
         page.heading("How it was made");
         page.small(&[format!("Reference: {}; its noise is relMSE {:.1e}.", self.reference, self.reference_noise)]);
         page.small(&self.footnotes);
         page
     }
+}
+
+/// Brighter or darker, and by how much, over the channels that the reference has.
+fn brightness(model: &Compared) -> String {
+    let known: Vec<f64> = model.mean_ratio.iter().flatten().map(|e| e.value).collect();
+    let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+    let side = if mean > 1.0 { "brighter" } else { "darker" };
+    format!("{:.1} % {side} in the mean", 100.0 * (mean - 1.0).abs())
 }
 
 #[cfg(test)]
@@ -176,6 +188,7 @@ mod tests {
             samples: 16,
             mean_ratio: ratio(mean),
             measured,
+            squared_bias: None,
             noise: 1e-3,
             width: Some(0.1),
         };
@@ -183,6 +196,7 @@ mod tests {
             scene: "s".into(),
             reference: "r".into(),
             reference_noise: 1e-4,
+            reference_halves: false,
             models: vec![model("wrong", 1.01e-1, 1.2), model("right", 1.1e-3, 1.0)],
             range: 0.2,
             footnotes: Vec::new(),
