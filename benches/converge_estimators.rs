@@ -249,6 +249,7 @@ fn plot(name: &str, contestants: &[Contestant], curves: &[Vec<(f64, f64)>], seco
     let threads = rayon::current_num_threads();
     Figure {
         width: None,
+        ends: Vec::new(),
         title: "Estimators of the sample cache: error against time".into(),
         subtitle: format!("{name}, {threads} threads, all by turns in one run"),
         rows: vec![Row { height: 420.0, panels: vec![panel] }],

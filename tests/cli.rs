@@ -2,62 +2,24 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
+mod command;
+
+use command::{ball, marmor, text};
 use marmor::film::Image;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-const SCENE: &str = r#"
-unit = "mm"
-[camera]
-position = [0, 2, 6]
-look_at = [0, 0, 0]
-fov = 30
-resolution = [40, 30]
-[[object]]
-name = "ball"
-shape = "sphere"
-centre = [0, 0, 0]
-radius = 1
-rings = 16
-segments = 32
-material = "wax"
-[[object]]
-name = "lamp"
-shape = "rectangle"
-centre = [0, 5, 0]
-edge_u = [2, 0, 0]
-edge_v = [0, 0, 2]
-material = "lamp"
-[material.wax]
-type = "translucent"
-sigma_s_prime = [2, 3, 4]
-sigma_a = [0.05, 0.1, 0.2]
-eta = 1.3
-[material.lamp]
-type = "emissive"
-radiance = 5
-[method]
-cache_samples = 500
-[render]
-spp = 4
-"#;
+fn scene() -> String {
+    ball([40, 30], "[method]\ncache_samples = 500\n[render]\nspp = 4\n")
+}
 
 /// A folder with a scene and a mesh in it.
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let folder = command::folder(&scene());
     fs::write(folder.path().join("triangle.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").unwrap();
     folder
-}
-
-fn marmor(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_marmor")).current_dir(folder).args(arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 /// The picture of a render that must succeed.
@@ -221,14 +183,14 @@ fn wrong_input_gives_one_clear_error_and_its_exit_code() {
     let write = |name: &str, content: &str| fs::write(folder.path().join(name), content).unwrap();
     write("not.toml", "camera = {");
     write("empty.toml", "");
-    write("typo.toml", &SCENE.replace("look_at", "lookat"));
-    write("nomaterial.toml", &SCENE.replace("material = \"wax\"", "material = \"wxa\""));
-    write("negative.toml", &SCENE.replace("[0.05, 0.1, 0.2]", "[-0.05, 0.1, 0.2]"));
-    write("noeta.toml", &SCENE.replace("eta = 1.3", ""));
-    write("nomesh.toml", &(SCENE.to_string() + "[[object]]\nname = \"m\"\nmesh = \"gone.obj\"\nmaterial = \"wax\"\n"));
-    write("badmesh.toml", &(SCENE.to_string() + "[[object]]\nname = \"m\"\nmesh = \"bad.obj\"\nmaterial = \"wax\"\n"));
+    write("typo.toml", &scene().replace("look_at", "lookat"));
+    write("nomaterial.toml", &scene().replace("material = \"wax\"", "material = \"wxa\""));
+    write("negative.toml", &scene().replace("[0.05, 0.1, 0.2]", "[-0.05, 0.1, 0.2]"));
+    write("noeta.toml", &scene().replace("eta = 1.3", ""));
+    write("nomesh.toml", &(scene() + "[[object]]\nname = \"m\"\nmesh = \"gone.obj\"\nmaterial = \"wax\"\n"));
+    write("badmesh.toml", &(scene() + "[[object]]\nname = \"m\"\nmesh = \"bad.obj\"\nmaterial = \"wax\"\n"));
     write("bad.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n");
-    write("nan.toml", &(SCENE.to_string() + "[[object]]\nname = \"m\"\nmesh = \"nan.obj\"\nmaterial = \"wax\"\n"));
+    write("nan.toml", &(scene() + "[[object]]\nname = \"m\"\nmesh = \"nan.obj\"\nmaterial = \"wax\"\n"));
     write("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n");
     write("file", "");
     write("notexr.exr", "hello");

@@ -2,59 +2,14 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
+mod command;
+
+use command::{ball_under_sky, marmor};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-
-const SCENE: &str = r#"
-unit = "mm"
-[camera]
-position = [0, 2, 6]
-look_at = [0, 0, 0]
-fov = 30
-resolution = [24, 16]
-[[object]]
-name = "ball"
-shape = "sphere"
-centre = [0, 0, 0]
-radius = 1
-rings = 16
-segments = 32
-material = "wax"
-[[object]]
-name = "lamp"
-shape = "rectangle"
-centre = [0, 5, 0]
-edge_u = [2, 0, 0]
-edge_v = [0, 0, 2]
-material = "lamp"
-[material.wax]
-type = "translucent"
-sigma_s_prime = [2, 3, 4]
-sigma_a = [0.05, 0.1, 0.2]
-eta = 1.3
-[material.lamp]
-type = "emissive"
-radiance = 5
-[environment]
-radiance = 1
-[method]
-cache_samples = 200
-"#;
-
-fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
-    folder
-}
-
-fn marmor(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_marmor")).current_dir(folder).args(arguments).output().unwrap()
-}
 
 #[test]
 fn models_are_held_against_a_truth() {
-    let folder = folder();
+    let folder = ball_under_sky();
     let arguments = [
         "compare",
         "scene.toml",
@@ -97,7 +52,7 @@ fn models_are_held_against_a_truth() {
 
 #[test]
 fn a_model_against_itself_shows_no_bias() {
-    let folder = folder();
+    let folder = ball_under_sky();
     let arguments =
         ["compare", "scene.toml", "--models", "standard", "--truth", "standard", "--time-budget", "300ms", "-o", "out"];
     let told = marmor(folder.path(), &arguments);
@@ -110,16 +65,19 @@ fn a_model_against_itself_shows_no_bias() {
 
 #[test]
 fn a_stored_film_is_a_truth_with_noise() {
-    let folder = folder();
+    let folder = ball_under_sky();
     let run = |arguments: &[&str]| {
         let output = marmor(folder.path(), arguments);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     };
     run(&["render", "scene.toml", "-q", "--model", "standard", "--seed", "9", "--spp", "16", "-o", "truth.film"]);
-    let compare = ["compare", "scene.toml", "--models", "standard,better", "--reference", "truth.film", "--time-budget"];
+    let compare =
+        ["compare", "scene.toml", "--models", "standard,better", "--reference", "truth.film", "--time-budget"];
     run(&[&compare[..], &["300ms", "-q", "-o", "out"]].concat());
     let csv = fs::read_to_string(folder.path().join("out/compare.csv")).unwrap();
-    assert!(csv.starts_with("# scene; reference: truth.film, 16 samples; its noise: relMSE ") && !csv.contains("0.000e0"));
+    assert!(
+        csv.starts_with("# scene; reference: truth.film, 16 samples; its noise: relMSE ") && !csv.contains("0.000e0")
+    );
     let number = |row: usize, column: usize| -> f64 {
         csv.lines().nth(2 + row).unwrap().split(',').nth(column).unwrap().parse().unwrap()
     };

@@ -2,65 +2,20 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
+mod command;
+
+use command::{ball_under_sky, marmor};
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-
-const SCENE: &str = r#"
-unit = "mm"
-[camera]
-position = [0, 2, 6]
-look_at = [0, 0, 0]
-fov = 30
-resolution = [24, 16]
-[[object]]
-name = "ball"
-shape = "sphere"
-centre = [0, 0, 0]
-radius = 1
-rings = 16
-segments = 32
-material = "wax"
-[[object]]
-name = "lamp"
-shape = "rectangle"
-centre = [0, 5, 0]
-edge_u = [2, 0, 0]
-edge_v = [0, 0, 2]
-material = "lamp"
-[material.wax]
-type = "translucent"
-sigma_s_prime = [2, 3, 4]
-sigma_a = [0.05, 0.1, 0.2]
-eta = 1.3
-[material.lamp]
-type = "emissive"
-radiance = 5
-[environment]
-radiance = 1
-[method]
-cache_samples = 200
-"#;
-
-fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
-    folder
-}
-
-fn marmor(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_marmor")).current_dir(folder).args(arguments).output().unwrap()
-}
 
 #[test]
 fn a_report_has_its_page_plots_table_and_records() {
-    let folder = folder();
+    let folder = ball_under_sky();
     let arguments =
         ["converge", "scene.toml", "--methods", "all,notes+100,all+standard", "--time-budget", "150ms", "-o", "out"];
     let output = marmor(folder.path(), &arguments);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
-    assert!(told.contains("has the smallest error") && told.contains("index.html"), "{told}");
+    assert!(told.contains("the smallest error") && told.contains("index.html"), "{told}");
     let out = folder.path().join("out");
     let page = fs::read_to_string(out.join("index.html")).unwrap();
     assert!(page.len() < 2_000_000, "{}", page.len());
@@ -73,6 +28,7 @@ fn a_report_has_its_page_plots_table_and_records() {
     for svg in ["error_seconds.svg", "error_samples.svg"] {
         let svg = fs::read_to_string(out.join(svg)).unwrap();
         assert!(svg.starts_with("<svg") && !svg.contains("NaN") && !svg.contains("inf"));
+        assert!(svg.contains("Machine: ") && svg.contains("marmor converge"), "alone, a plot says how it was made");
     }
     let csv = fs::read_to_string(out.join("converge.csv")).unwrap();
     let columns = csv.lines().nth(1).unwrap().split(',').count();
@@ -85,9 +41,22 @@ fn a_report_has_its_page_plots_table_and_records() {
     }
 }
 
+/// A coarse cut of centroids is far off: the page names it, and where its curve ends.
+#[test]
+fn a_method_that_flattens_is_named() {
+    let folder = ball_under_sky();
+    let methods = "cut,cluster+cut_error=0.9";
+    let arguments = ["converge", "scene.toml", "--methods", methods, "--time-budget", "400ms", "-o", "out"];
+    let output = marmor(folder.path(), &[&arguments[..], &["-D", "method.cache_samples=2000"]].concat());
+    assert!(output.status.success(), "{}", command::text(&output.stderr));
+    let page = fs::read_to_string(folder.path().join("out/index.html")).unwrap();
+    assert!(page.contains("cluster+cut_error=0.9 flattens: relMSE "), "{page:.2000}");
+    assert!(!page.contains(">cut flattens"), "{page:.2000}");
+}
+
 #[test]
 fn a_reference_may_be_given() {
-    let folder = folder();
+    let folder = ball_under_sky();
     assert!(marmor(folder.path(), &["render", "scene.toml", "-q", "-o", "r.exr", "--spp", "64"]).status.success());
     let output = marmor(
         folder.path(),
@@ -112,7 +81,7 @@ fn a_reference_may_be_given() {
 
 #[test]
 fn a_wrong_method_is_named_with_the_nearest_one() {
-    let folder = folder();
+    let folder = ball_under_sky();
     for (methods, part) in
         [("cut,notse", "did you mean `notes`"), ("cut+as_notes", "as_notes has its own"), ("cut_eror=0.1", "cut_error")]
     {
@@ -124,7 +93,7 @@ fn a_wrong_method_is_named_with_the_nearest_one() {
 
 #[test]
 fn an_error_to_reach_ends_a_render() {
-    let folder = folder();
+    let folder = ball_under_sky();
     let output = marmor(
         folder.path(),
         &["render", "scene.toml", "-o", "x.exr", "--target-error", "2e-3", "--records", "r.jsonl", "--spp", "4000"],
@@ -137,13 +106,14 @@ fn an_error_to_reach_ends_a_render() {
         .map(|l| serde_json::from_str::<serde_json::Value>(l).unwrap()["self_relmse"].as_f64().unwrap_or(f64::MAX))
         .collect();
     let (last, before) = figures.split_last().unwrap();
-    assert!(*last <= 2e-3 && before.iter().skip(8).all(|v| *v > 2e-3), "{figures:?}");
+    // What ends a render is a little more careful than what it tells.
+    assert!(*last <= 2e-3 && before.iter().skip(8).all(|v| *v > 1.7e-3), "{figures:?}");
     assert!(told.contains("estimated relMSE"));
 }
 
 #[test]
 fn variance_is_a_layer_of_the_exr() {
-    let folder = folder();
+    let folder = ball_under_sky();
     let arguments = ["render", "scene.toml", "-q", "-o", "x.exr", "--layers", "variance", "--spp", "16"];
     assert!(marmor(folder.path(), &arguments).status.success());
     let layer = marmor::film::Image::read_exr_layer(&folder.path().join("x.exr"), Some("Variance")).unwrap();

@@ -3,48 +3,23 @@
 #![cfg(all(feature = "cli", unix))]
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
+mod command;
+
+use command::{ball, text};
 use std::fs;
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-const SCENE: &str = r#"
-unit = "mm"
-[camera]
-position = [0, 2, 6]
-look_at = [0, 0, 0]
-fov = 30
-resolution = [40, 30]
-[[object]]
-name = "ball"
-shape = "sphere"
-centre = [0, 0, 0]
-radius = 1
-rings = 16
-segments = 32
-material = "wax"
+/// Diffuse ground under the ball.
+const MORE: &str = r#"
 [[object]]
 name = "floor"
 mesh = "floor.obj"
 material = "grey"
-[[object]]
-name = "lamp"
-shape = "rectangle"
-centre = [0, 5, 0]
-edge_u = [2, 0, 0]
-edge_v = [0, 0, 2]
-material = "lamp"
-[material.wax]
-type = "translucent"
-sigma_s_prime = [2, 3, 4]
-sigma_a = [0.05, 0.1, 0.2]
-eta = 1.3
 [material.grey]
 type = "diffuse"
 albedo = 0.5
-[material.lamp]
-type = "emissive"
-radiance = 5
 [method]
 cache_samples = 500
 [render]
@@ -52,25 +27,20 @@ spp = 12
 "#;
 
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scene.toml"), SCENE).unwrap();
+    let folder = command::folder(&ball([40, 30], MORE));
     fs::write(folder.path().join("floor.obj"), "v -5 -1 -5\nv -5 -1 5\nv 5 -1 5\nv 5 -1 -5\nf 1 2 3 4\n").unwrap();
     folder
 }
 
 fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_marmor"));
+    let mut command = command::command(folder, arguments);
     // No times in the files: then equal pictures are equal bytes.
-    command.current_dir(folder).args(arguments).env("SOURCE_DATE_EPOCH", "1700000000");
+    command.env("SOURCE_DATE_EPOCH", "1700000000");
     command
 }
 
 fn marmor(folder: &Path, arguments: &[&str]) -> Output {
     command(folder, arguments).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8_lossy(bytes).into_owned()
 }
 
 fn ok(folder: &Path, arguments: &[&str]) -> String {
@@ -215,7 +185,7 @@ fn strict_is_exit_5_with_a_line_that_replays_the_pixel() {
     // A wide lamp of nearly the largest f32: products leave it.
     let render = ["render", "scene.toml", "-o", "x.exr", "--spp", "2", "--method", "direct"];
     let wide =
-        ["-D", "material.lamp.radiance=3e38", "-D", "object.2.edge_u=[20,0,0]", "-D", "object.2.edge_v=[0,0,20]"];
+        ["-D", "material.lamp.radiance=3e38", "-D", "object.1.edge_u=[20,0,0]", "-D", "object.1.edge_v=[0,0,20]"];
     let arguments = [&render[..], &wide].concat();
     let told = ok(folder, &arguments);
     let last = told.lines().last().unwrap();

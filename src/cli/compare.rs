@@ -2,19 +2,14 @@
 
 use super::converge::{file_name, scene_name};
 use super::keep::cancel_on_signals;
-use super::race::{Entrant, Runner, command, machine, race};
-use super::render::duration;
-use super::setup::MethodArgs;
-use marmor::film::{
-    Checkpoint, Format, Image, Metadata, PngOptions, SelfError, metrics, png_bytes, save, write_atomically,
-};
+use super::race::{RaceArgs, Runner, command, machine, race};
+use marmor::Result;
+use marmor::film::{Checkpoint, Format, Image, Metadata, PngOptions, SelfError, metrics, png_bytes, save};
 use marmor::math::Rgb;
 use marmor::report::{Compared, ModelComparison, Picture, common_range, false_colours};
 use marmor::scene::MethodName;
-use marmor::{Error, Result};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
-use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -22,45 +17,19 @@ A model is one or more words joined by `+`, as for `marmor converge --methods`: 
 Writes for each model NAME.exr and NAME.png, NAME_difference.exr (signed), NAME_relative.exr and NAME_relative.png
 (false colours), then compare.csv and one page, index.html.")]
 pub struct Args {
-    /// The scene file
-    scene: PathBuf,
     /// Models to compare, separated by commas
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', required = true)]
     models: Vec<String>,
     /// What the models are held against, in the words of a model [default: volume_path]
     #[arg(long, value_name = "METHOD", conflicts_with = "reference")]
     truth: Option<String>,
-    /// Hold the models against this EXR instead, or this film file, which also tells its own noise
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
-    /// Time of rendering for each model, such as 20s
-    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "20s")]
-    time_budget: Duration,
-    /// Time of rendering for the reference [default: three times the budget of a model]
-    #[arg(long, value_name = "TIME", value_parser = duration)]
-    reference_budget: Option<Duration>,
-    /// Folder for the results; made if it is not there
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
     #[command(flatten)]
-    method: MethodArgs,
-    /// Threads [default: one for each core]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    quiet: bool,
+    race: RaceArgs,
 }
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    std::fs::create_dir_all(&args.output).map_err(|e| Error::file(&args.output, "make the folder", e))?;
-    let mut builder = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = args.threads {
-        builder = builder.num_threads(threads.max(1));
-    }
-    let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;
-    pool.install(|| compare(&args))
+    args.race.run(|| compare(&args.race, &args.models, args.truth.as_deref()))
 }
 
 /// A picture with the relMSE of its noise.
@@ -72,46 +41,31 @@ struct Truth {
     noise: f64,
 }
 
-fn compare(args: &Args) -> Result<ExitCode> {
-    let say = |text: &str| {
-        if !args.quiet {
-            eprintln!("{text}");
-        }
-    };
-    let entrants = args
-        .models
-        .iter()
-        .map(|spec| Entrant::new(spec, &args.scene, &args.method.variant(spec)?))
-        .collect::<Result<Vec<_>>>()?;
+fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<ExitCode> {
+    let entrants = args.entrants(models)?;
     let mut runners = entrants.iter().map(Runner::new).collect::<Result<Vec<_>>>()?;
     let cancel = cancel_on_signals();
-    let budget = args.time_budget.as_secs_f64();
-    let reference_budget = args.reference_budget.map_or(3.0 * budget, |t| t.as_secs_f64());
+    let budget = args.budget();
     let truth = match &args.reference {
         Some(path) => stored(path)?,
         None => {
-            let spec = args.truth.as_deref().unwrap_or(MethodName::VolumePath.name());
-            say(&format!("reference {spec}: {reference_budget:.0} s"));
-            let seed = args.method.seed().unwrap_or(0) ^ 0x7472_7574;
-            let entrant = Entrant::new(spec, &args.scene, &args.method.variant(spec)?.seeded(seed))?;
+            let spec = truth.unwrap_or(MethodName::VolumePath.name());
+            args.say(&format!("reference {spec}: {:.0} s", args.reference_budget()));
+            let entrant = args.reference_entrant(spec, Some(spec), 0x7472_7574)?;
             let mut runner = [Runner::new(&entrant)?];
-            race(&mut runner, reference_budget, &cancel, |_, r| r.follow())?;
+            race(&mut runner, args.reference_budget(), &cancel, |_, r| r.follow())?;
             let [runner] = runner;
             let noise = runner.own.last().and_then(|e| e.relmse).map_or(0.0, |e| e.value);
             let halves = runner.film.half_images();
             Truth { text: spec.to_owned(), image: runner.film.image(), halves, noise }
         }
     };
-    say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
+    args.say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
     let whole = race(&mut runners, budget, &cancel, |_, runner| runner.follow())?;
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
     let footnotes = vec![format!("Machine: {}.", machine()), format!("Command: {}", command())];
     let report = write(args, &mut runners, &truth, exposure, footnotes)?;
-    for sentence in report.sentences() {
-        say(&sentence);
-    }
-    say(&format!("wrote {}", args.output.join("index.html").display()));
-    Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) })
+    Ok(args.conclude(&report.sentences(), whole))
 }
 
 /// A picture that was rendered before. An EXR counts as free of noise; a film has the halves that tell it.
@@ -130,7 +84,7 @@ fn stored(path: &Path) -> Result<Truth> {
 const SHOWN: u32 = 320;
 
 fn write(
-    args: &Args,
+    args: &RaceArgs,
     runners: &mut [Runner<'_>],
     truth: &Truth,
     exposure: f64,
@@ -168,8 +122,8 @@ fn write(
                 .half_images()
                 .and_then(|halves| metrics::squared_bias(&halves, &truth.image, truth.halves.as_ref())),
             measured: comparison.whole.relmse.map_or(0.0, |e| e.value),
-            noise: point.map_or(0.0, |p| p.own),
-            width: point.and_then(|p| p.width),
+            noise: point.own.unwrap_or(0.0),
+            width: point.width,
         });
     }
     let range = common_range(relatives.iter().map(|(_, _, image)| image));
@@ -189,9 +143,8 @@ fn write(
         range,
         footnotes,
     };
-    let put = |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
-    put("compare.csv", &report.to_csv())?;
-    put("index.html", &report.page(&pictures, &shown).to_html())?;
+    args.write("compare.csv", &report.to_csv())?;
+    args.write("index.html", &report.page(&pictures, &shown).to_html())?;
     Ok(report)
 }
 

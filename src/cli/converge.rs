@@ -2,16 +2,13 @@
 
 use super::keep::cancel_on_signals;
 use super::observers::{Records, error_figures};
-use super::race::{Entrant, Runner, command, machine, race};
-use super::render::duration;
-use super::setup::MethodArgs;
-use marmor::film::{Image, Window, png_bytes, write_atomically};
+use super::race::{RaceArgs, Runner, command, machine, race};
+use marmor::film::{Image, Window, png_bytes};
 use marmor::report::{Convergence, ErrorCurve, Picture, Record, RecordFile, Reference};
 use marmor::{Error, Result};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -21,69 +18,30 @@ A method is one or more words joined by `+`: an estimator, a model, a backend, a
 renders with each in turns until each has used the time budget, and writes report/index.html, the curves as CSV
 and SVG, and the records of each method.")]
 pub struct Args {
-    /// The scene file
-    scene: PathBuf,
     /// Methods to compare, separated by commas
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', required = true)]
     methods: Vec<String>,
-    /// Measure against this EXR [default: a reference is rendered with the scene's own method and another seed]
-    #[arg(long, value_name = "EXR")]
-    reference: Option<PathBuf>,
-    /// Time of rendering for each method, such as 20s
-    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "20s")]
-    time_budget: Duration,
-    /// Time of rendering for the reference [default: three times the budget of a method]
-    #[arg(long, value_name = "TIME", value_parser = duration)]
-    reference_budget: Option<Duration>,
-    /// Folder for the results; made if it is not there
-    #[arg(short, long, value_name = "DIR")]
-    output: PathBuf,
     #[command(flatten)]
-    method: MethodArgs,
-    /// Threads [default: one for each core]
-    #[arg(long, value_name = "N")]
-    threads: Option<usize>,
-    /// Say nothing but errors
-    #[arg(short, long)]
-    quiet: bool,
+    race: RaceArgs,
 }
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    std::fs::create_dir_all(&args.output).map_err(|e| Error::file(&args.output, "make the folder", e))?;
-    let mut builder = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = args.threads {
-        builder = builder.num_threads(threads.max(1));
-    }
-    let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;
-    pool.install(|| converge(&args))
+    args.race.run(|| converge(&args.race, &args.methods))
 }
 
-fn converge(args: &Args) -> Result<ExitCode> {
-    let say = |text: &str| {
-        if !args.quiet {
-            eprintln!("{text}");
-        }
-    };
-    let entrants = args
-        .methods
-        .iter()
-        .map(|spec| Entrant::new(spec, &args.scene, &args.method.variant(spec)?))
-        .collect::<Result<Vec<_>>>()?;
+fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
+    let entrants = args.entrants(methods)?;
     let mut runners = entrants.iter().map(Runner::new).collect::<Result<Vec<_>>>()?;
     let cancel = cancel_on_signals();
-    let budget = args.time_budget.as_secs_f64();
+    let budget = args.budget();
     let resolution = runners[0].film.resolution();
     if let Some(other) = runners.iter().find(|r| r.film.resolution() != resolution) {
         let name = &other.entrant.name;
         return Err(Error::usage(format!("`{name}` has another resolution; pictures of one size are compared")));
     }
 
-    let reference_budget = args.reference_budget.map_or(3.0 * budget, |t| t.as_secs_f64());
-    if args.reference.is_none() {
-        say(&format!("reference: {reference_budget:.0} s"));
-    }
-    let (image, reference) = reference(args, reference_budget, &cancel)?;
+    let (image, reference) = reference(args, &cancel)?;
 
     let name = |i: usize| file_name(&entrants[i].name);
     let mut records = Vec::new();
@@ -95,14 +53,14 @@ fn converge(args: &Args) -> Result<ExitCode> {
         .iter()
         .map(|r| ErrorCurve { name: r.entrant.name.clone(), seconds_setup: r.seconds_setup, points: Vec::new() })
         .collect();
-    let (mut next, mut told) = (vec![2; runners.len()], 0);
-    say(&format!("{} methods in turns, {budget:.0} s each", runners.len()));
+    let (mut next, mut told) = (vec![1; runners.len()], 0);
+    args.say(&format!("{} methods in turns, {budget:.0} s each", runners.len()));
     let whole = race(&mut runners, budget, &cancel, |i, runner| {
         let passes = runner.film.passes();
         // Measuring takes milliseconds; steps of 3 % leave out nothing that a plot shows.
         if passes >= next[i] || runner.seconds.total() >= budget {
             next[i] = passes + 1 + passes / 32;
-            curves[i].points.extend(runner.measure(&image)?);
+            curves[i].points.push(runner.measure(&image)?);
             let record = Records::record(runner.seconds_setup, runner.seconds, &runner.tally, &runner.film);
             let own = runner.own.last().as_ref().map(Into::into);
             records[i].0.append(&Record {
@@ -119,7 +77,7 @@ fn converge(args: &Args) -> Result<ExitCode> {
         Ok(())
     })?;
     if !whole {
-        say("interrupted; the report is of what there is");
+        args.say("interrupted; the report is of what there is");
     }
     let report = Convergence {
         scene: scene_name(&args.scene),
@@ -132,22 +90,19 @@ fn converge(args: &Args) -> Result<ExitCode> {
         ],
     };
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
-    write_report(&args.output, &report, &runners, &image, exposure)?;
-    for sentence in report.sentences() {
-        say(&sentence);
-    }
-    say(&format!("wrote {}", args.output.join("index.html").display()));
-    Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) })
+    write_report(args, &report, &runners, &image, exposure)?;
+    Ok(args.conclude(&report.sentences(), whole))
 }
 
 /// The reference as given, or rendered with the scene's own method, another seed and a longer time.
-fn reference(args: &Args, budget: f64, cancel: &AtomicBool) -> Result<(Image, Reference)> {
+fn reference(args: &RaceArgs, cancel: &AtomicBool) -> Result<(Image, Reference)> {
     if let Some(path) = &args.reference {
         let text = format!("{}, taken as exact", path.display());
         return Ok((Image::read_exr(path)?, Reference { text, noise: 0.0 }));
     }
-    let seed = args.method.seed().unwrap_or(0) ^ 0x7265_6665;
-    let entrant = Entrant::new("reference", &args.scene, &args.method.clone().seeded(seed))?;
+    let budget = args.reference_budget();
+    args.say(&format!("reference: {budget:.0} s"));
+    let entrant = args.reference_entrant("reference", None, 0x7265_6665)?;
     let mut runners = [Runner::new(&entrant)?];
     race(&mut runners, budget, cancel, |_, _| Ok(()))?;
     let [mut runner] = runners;
@@ -165,16 +120,15 @@ fn reference(args: &Args, budget: f64, cancel: &AtomicBool) -> Result<(Image, Re
 }
 
 fn write_report(
-    folder: &Path,
+    args: &RaceArgs,
     report: &Convergence,
     runners: &[Runner<'_>],
     truth: &Image,
     exposure: f64,
 ) -> Result<()> {
-    let write = |name: &str, text: &str| write_atomically(&folder.join(name), |out| out.write_all(text.as_bytes()));
-    write("converge.csv", &report.to_csv())?;
+    args.write("converge.csv", &report.to_csv())?;
     for (figure, name) in report.figures().iter().zip(["error_seconds.svg", "error_samples.svg"]) {
-        write(name, &figure.to_svg())?;
+        args.write(name, &figure.to_svg())?;
     }
     let images: Vec<Image> = runners.iter().map(|r| r.film.image()).collect();
     let part = telling_part(&images, truth);
@@ -189,7 +143,7 @@ fn write_report(
     }
     crops.push(picture(&truth.cropped(part), "reference", String::new(), true)?);
     thumbnails.push(picture(&truth.shrunk(THUMBNAIL), "reference", String::new(), false)?);
-    write("index.html", &report.page(&crops, &thumbnails).to_html())
+    args.write("index.html", &report.page(&crops, &thumbnails).to_html())
 }
 
 /// Longest side of a thumbnail [pixels].

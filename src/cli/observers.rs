@@ -75,8 +75,8 @@ impl Observer for Measure {
 
     fn satisfied(&self) -> bool {
         let Some((target, told)) = self.target.zip(self.told.get()) else { return false };
-        match told.relmse {
-            Some(relmse) => self.next > FEWEST_PASSES && relmse.value <= target,
+        match told.relmse_careful {
+            Some(relmse) => self.next > FEWEST_PASSES && relmse <= target,
             // A black picture: nothing else will come.
             None => self.next > 8 * FEWEST_PASSES,
         }
@@ -127,7 +127,8 @@ impl ProgressDisplay {
     fn fraction_done(&self, progress: &Progress<'_>) -> f64 {
         let by_passes = progress.job.passes.map_or(0.0, |n| f64::from(progress.film.passes()) / f64::from(n));
         let by_time = progress.job.time.map_or(0.0, |t| progress.seconds.total() / t.as_secs_f64());
-        let by_error = self.target.zip(self.own.relmse()).map_or(0.0, |(target, own)| target / own.value);
+        let own = self.own.get().and_then(|own| own.relmse_careful);
+        let by_error = self.target.zip(own).map_or(0.0, |(target, own)| target / own);
         by_passes.max(by_time).max(by_error).min(1.0)
     }
 }

@@ -1,16 +1,97 @@
 //! Several ways to render one scene, pass by pass in turns on equal time: shared by `converge` and `compare`.
 
+use super::render::duration;
 use super::setup::{MethodArgs, Prepared, prepare};
 use marmor::film::metrics;
-use marmor::film::{Film, Image, SelfError, Window};
+use marmor::film::{Film, Image, SelfError, Window, write_atomically};
 use marmor::integrator::{Tally, View};
 use marmor::query::{self, RayQuery};
 use marmor::render::{Job, Seconds};
 use marmor::report::ErrorPoint;
 use marmor::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// Options that `converge` and `compare` have in common.
+#[derive(clap::Args)]
+pub struct RaceArgs {
+    /// The scene file
+    pub scene: PathBuf,
+    /// Measure against this EXR (or for `compare` a film file, which tells its own noise) instead of a reference rendered for it
+    #[arg(long, value_name = "EXR")]
+    pub reference: Option<PathBuf>,
+    /// Time of rendering for each of them, such as 20s
+    #[arg(long, value_name = "TIME", value_parser = duration, default_value = "20s")]
+    time_budget: Duration,
+    /// Time of rendering for the reference [default: three times that of each]
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    reference_budget: Option<Duration>,
+    /// Folder for the results; made if it is not there
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub method: MethodArgs,
+    /// Threads [default: one for each core]
+    #[arg(long, value_name = "N")]
+    threads: Option<usize>,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+impl RaceArgs {
+    /// Makes the folder and runs `job` on the threads asked for.
+    pub fn run<T: Send>(&self, job: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+        std::fs::create_dir_all(&self.output).map_err(|e| Error::file(&self.output, "make the folder", e))?;
+        let mut builder = rayon::ThreadPoolBuilder::new();
+        if let Some(threads) = self.threads {
+            builder = builder.num_threads(threads.max(1));
+        }
+        builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?.install(job)
+    }
+
+    /// A line on standard error, unless `--quiet`.
+    pub fn say(&self, text: &str) {
+        if !self.quiet {
+            eprintln!("{text}");
+        }
+    }
+
+    /// Time of rendering for each [s].
+    pub fn budget(&self) -> f64 {
+        self.time_budget.as_secs_f64()
+    }
+
+    /// Time of rendering for the reference [s].
+    pub fn reference_budget(&self) -> f64 {
+        self.reference_budget.map_or(3.0 * self.budget(), |t| t.as_secs_f64())
+    }
+
+    /// One entrant for each of `specs`.
+    pub fn entrants(&self, specs: &[String]) -> Result<Vec<Entrant>> {
+        specs.iter().map(|spec| Entrant::new(spec, &self.scene, &self.method.variant(spec)?)).collect()
+    }
+
+    /// The entrant that renders the reference, named `name`, with the words of `spec` and a seed of its own.
+    pub fn reference_entrant(&self, name: &str, spec: Option<&str>, salt: u64) -> Result<Entrant> {
+        let method = spec.map_or_else(|| Ok(self.method.clone()), |spec| self.method.variant(spec))?;
+        Entrant::new(name, &self.scene, &method.seeded(self.method.seed().unwrap_or(0) ^ salt))
+    }
+
+    /// A file of the report, under its name in the folder.
+    pub fn write(&self, name: &str, text: &str) -> Result<()> {
+        write_atomically(&self.output.join(name), |out| out.write_all(text.as_bytes()))
+    }
+
+    /// Says the sentences and where the page is; `whole` is false after an interruption.
+    pub fn conclude(&self, sentences: &[String], whole: bool) -> ExitCode {
+        sentences.iter().for_each(|sentence| self.say(sentence));
+        self.say(&format!("wrote {}", self.output.join("index.html").display()));
+        if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) }
+    }
+}
 
 /// A way to render, with its scene and tables.
 pub struct Entrant {
@@ -88,20 +169,20 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
-    /// The errors as they are now; none before the halves tell.
-    pub fn measure(&mut self, reference: &Image) -> Result<Option<ErrorPoint>> {
-        let Some(own) = self.own.measure(&self.film).and_then(|e| e.relmse) else { return Ok(None) };
+    /// The errors as they are now.
+    pub fn measure(&mut self, reference: &Image) -> Result<ErrorPoint> {
+        let own = self.own.measure(&self.film).and_then(|e| e.relmse);
         let errors = metrics::compare(&self.film.image(), reference, None)?.whole;
         let Some(relmse) = errors.relmse else {
             return Err(Error::usage("the reference is black: no relative error"));
         };
-        Ok(Some(ErrorPoint {
+        Ok(ErrorPoint {
             samples: self.film.passes(),
             seconds: self.seconds.total(),
             measured: relmse.value,
-            own: own.value,
-            width: own.interval.map(|[low, high]| (high / low).ln() / 2.0),
-        }))
+            own: own.map(|e| e.value),
+            width: own.and_then(|e| e.interval).map(|[low, high]| (high / low).ln() / 2.0),
+        })
     }
 }
 

@@ -10,10 +10,10 @@
 //! of a pass share a cache: with C the covariance of the weighted error of x, T / S is distributed about as F(k, k),
 //! k = (tr C)^2 / tr C^2, the number of independent errors in the picture.
 //!
-//! k comes from the picture as well. Two runs of passes, an earlier and a later one, give in each half a difference that is
-//! pure noise, a and b; they are independent, so (a, b)^2 has the expectation tr(C_a C_b). Taken block by block, since
-//! errors far apart do not go together, this has as many degrees of freedom as there are blocks that count. How far is
-//! far differs, so blocks of three sizes are tried.
+//! k comes from the picture as well. The earlier and the later passes of a half differ by pure noise, a in one half and b in
+//! the other; a and b are independent, so (a, b)^2 has the expectation tr(C_a C_b). Taken block by block, since errors far
+//! apart do not go together, this has as many degrees of freedom as there are blocks that count. How far is far differs,
+//! so blocks of up to three sizes are tried.
 
 use super::metrics::{BLOCK, Estimate, student_975};
 use super::{Film, Window};
@@ -27,6 +27,9 @@ pub struct SelfErrors {
     pub rmse: Estimate,
     /// mean((x - limit)^2 / (limit^2 + 0.01 mean(limit)^2)); none where the picture is black.
     pub relmse: Option<Estimate>,
+    /// The same, with more weight for a pixel that has met little light and much at a time: for ending a render. `relmse`
+    /// is too small where many pixels are like that, this is a little too large where few are.
+    pub relmse_careful: Option<f64>,
 }
 
 /// Follows a film while it grows and estimates its error. It keeps two earlier states of the film, 24 bytes each for a
@@ -58,6 +61,13 @@ impl State {
 
     fn total(&self) -> u32 {
         self.passes[0] + self.passes[1]
+    }
+
+    /// Whether both halves of `later` have passes that this has not, together so many that their noise is like that of
+    /// the passes before.
+    fn is_far_before(&self, later: &Self) -> bool {
+        let more = |half: usize| later.passes[half] > self.passes[half];
+        more(0) && more(1) && f64::from(later.total()) >= FAR * f64::from(self.total())
     }
 
     /// Mean of half `half` over the passes of `self`, less the mean over the passes from then to `later`, at pixel i.
@@ -97,18 +107,30 @@ impl SelfError {
         let level = pixels.iter().map(|&i| (0..3).map(|c| mean(i, c)).sum::<f64>()).sum::<f64>();
         let floor = 0.01 * (level / (3 * pixels.len()) as f64).powi(2);
         let scale = n[0] * n[1] / (all * all * (3 * pixels.len()) as f64);
-        let mut times: Vec<&State> =
-            self.earlier.iter().filter(|s| (0..2).all(|h| s.passes[h] < now.passes[h])).collect();
-        times.push(&now);
+        let before = self.earlier.iter().rev().find(|s| s.is_far_before(&now));
+        let difference = |i: usize, c: usize| halves(i, c)[0] - halves(i, c)[1];
+        let value = |weight: Weight<'_>| {
+            let square = |i: usize, c: usize| weight(i, c) * difference(i, c).powi(2);
+            scale * pixels.iter().map(|&i| (0..3).map(|c| square(i, c)).sum::<f64>()).sum::<f64>()
+        };
         let estimate = |weight: Weight<'_>| {
-            let square = |i: usize, c: usize| weight(i, c) * (halves(i, c)[0] - halves(i, c)[1]).powi(2);
-            let value = scale * pixels.iter().map(|&i| (0..3).map(|c| square(i, c)).sum::<f64>()).sum::<f64>();
-            let width = Together::of(film.window(), &pixels, &times, weight).and_then(Together::log_width);
+            let value = value(weight);
+            let width = before
+                .and_then(|before| Together::of(film.window(), &pixels, [before, &now], weight))
+                .and_then(Together::log_width);
             Estimate { value, interval: width.map(|w| [value * (-w).exp(), value * w.exp()]) }
         };
+        // Noise of a pixel is in its own level too: a first bright sample makes it bright and so its error relatively small.
+        // The square of the level without some of that noise is nearer to the square of the limit.
+        let level = |i: usize, c: usize| {
+            let noise = n[0] * n[1] / (all * all) * difference(i, c).powi(2);
+            (mean(i, c).powi(2) - CAREFUL * noise).max(0.0)
+        };
+        let lit = floor > 0.0;
         let errors = SelfErrors {
             rmse: estimate(&|_, _| 1.0).sqrt(),
-            relmse: (floor > 0.0).then(|| estimate(&|i, c| 1.0 / (mean(i, c).powi(2) + floor))),
+            relmse: lit.then(|| estimate(&|i, c| 1.0 / (mean(i, c).powi(2) + floor))),
+            relmse_careful: lit.then(|| value(&|i, c| 1.0 / (level(i, c) + floor))),
         };
         if self.pixels.is_none() && pixels.len() != film.window().area() {
             self.pixels = Some(pixels);
@@ -123,7 +145,7 @@ impl SelfError {
         self.last
     }
 
-    /// Keeps the states at about a quarter and a half of the passes to come.
+    /// Keeps the two newest states of a row in which each has twice the passes of the one before.
     fn keep(&mut self, now: State) {
         if self.earlier.last().is_none_or(|last| now.total() >= 2 * last.total()) {
             if self.earlier.len() == KEPT {
@@ -134,12 +156,20 @@ impl SelfError {
     }
 }
 
-/// Earlier states kept: at about a half and a quarter of the passes.
+/// Earlier states kept: one of them is between a quarter and 1 / [`FAR`] of the passes.
 const KEPT: usize = 2;
 
-/// Errors go together more in the whole than in the runs it is judged by, since the sequence spreads out first what is
-/// each pixel's own: measured over the renders of docs/convergence.md, 1 / k is larger by this.
-const CLOSER: f64 = 1.4;
+/// Share of a pixel's noise that is taken off the square of its level for `relmse_careful`. All of it would be right in the
+/// mean of the level, but the inverse is then far too large where the noise is; half is measured to serve all scenes.
+const CAREFUL: f64 = 0.5;
+
+/// Passes now over passes then, at the least, for a difference between the two that is like the error of all. That of a
+/// few passes more is not: noise of single passes is spread over more pixels.
+const FAR: f64 = 1.4;
+
+/// Errors go together more in the whole than in the differences they are judged by, since the sequence spreads out first
+/// what is each pixel's own: measured over the renders of docs/convergence.md, 1 / k is larger by this.
+const CLOSER: f64 = 1.25;
 
 /// How many errors of a picture are independent of each other.
 #[derive(Clone, Copy, Debug)]
@@ -151,80 +181,65 @@ struct Together {
 }
 
 impl Together {
-    /// From the runs of passes between `times`; none without two runs.
-    fn of(window: Window, pixels: &[usize], times: &[&State], weight: Weight<'_>) -> Option<Self> {
-        let runs = times.len() - 1;
+    /// From the passes up to the first of `times` and those from there to the second.
+    fn of(window: Window, pixels: &[usize], times: [&State; 2], weight: Weight<'_>) -> Option<Self> {
+        let [before, now] = times;
         let side = block_side(window);
-        let columns = window.width().div_ceil(side);
-        let mut products = vec![[0.0; KEPT * KEPT]; columns * window.height().div_ceil(side)];
-        let mut squares = [[0.0; KEPT]; 2];
+        let mut grid = [window.width().div_ceil(side), window.height().div_ceil(side)];
+        let mut products = vec![0.0; grid[0] * grid[1]];
+        let mut squares = [0.0; 2];
         for &i in pixels {
-            let block = &mut products[i / window.width() / side * columns + i % window.width() / side];
-            let noise = |half: usize| -> [[f64; 3]; KEPT] {
-                std::array::from_fn(|r| if r < runs { times[r].contrast(times[r + 1], half, i) } else { [0.0; 3] })
-            };
-            let (a, b) = (noise(0), noise(1));
+            let block = &mut products[i / window.width() / side * grid[0] + i % window.width() / side];
+            let (a, b) = (before.contrast(now, 0, i), before.contrast(now, 1, i));
             for c in 0..3 {
                 let w = weight(i, c);
-                for r in 0..runs {
-                    squares[0][r] += w * a[r][c] * a[r][c];
-                    squares[1][r] += w * b[r][c] * b[r][c];
-                    for t in 0..runs {
-                        block[r * KEPT + t] += w * a[r][c] * b[t][c];
-                    }
-                }
+                squares[0] += w * a[c] * a[c];
+                squares[1] += w * b[c] * b[c];
+                *block += w * a[c] * b[c];
             }
         }
-        let mut worst = None;
-        let mut grid = [columns, products.len() / columns];
+        let mut worst: Option<Self> = None;
         for _ in 0..LEVELS {
-            let at_level = Self::of_blocks(&products, &squares, runs);
-            if worst.is_none_or(|w: Self| at_level.independent < w.independent) {
+            if worst.is_some() && products.len() < FEWEST_BLOCKS {
+                break;
+            }
+            let at_level = Self::of_blocks(&products, squares[0] * squares[1]);
+            if worst.is_none_or(|w| at_level.independent < w.independent) {
                 worst = Some(at_level);
             }
             products = four_to_one(&products, &mut grid);
         }
-        worst.filter(|_| runs > 0)
+        worst
     }
 
-    /// From the products of the noise of both halves in each block, and the squares of that noise.
-    fn of_blocks(products: &[[f64; KEPT * KEPT]], squares: &[[f64; KEPT]; 2], runs: usize) -> Self {
-        let (mut second, mut fourth) = (0.0, 0.0);
-        for r in 0..runs {
-            for t in 0..runs {
-                let size = squares[0][r] * squares[1][t];
-                for block in products {
-                    let shared = block[r * KEPT + t].powi(2) / size;
-                    second += shared;
-                    fourth += shared * shared;
-                }
-            }
-        }
+    /// From the products of the noise of both halves in each block, and the product of their squares.
+    fn of_blocks(products: &[f64], size: f64) -> Self {
+        let shared = products.iter().map(|p| p * p / size);
+        let (second, fourth) = shared.fold((0.0, 0.0), |(sum, squares), s| (sum + s, squares + s * s));
         // For products p of normal errors E p^4 = 3 (E p^2)^2, and E (sum of p^2)^2 has twice the sum of (E p^2)^2 on top.
-        let freedom = 3.0 * second * second / fourth - 2.0;
-        Self { independent: (runs * runs) as f64 / second, freedom }
+        Self { independent: 1.0 / second, freedom: 3.0 * second * second / fourth - 2.0 }
     }
 
     /// Half of the 95 % interval of log(T / S); none without noise.
     fn log_width(self) -> Option<f64> {
         let width =
             student_975(self.freedom.max(1.0) as usize) * 2.0 / (self.independent / CLOSER - 1.0).max(1.0).sqrt();
-        width.is_finite().then_some(width)
+        self.independent.is_finite().then_some(width)
     }
 }
 
 /// Blocks of 1, 2 and 4 times the side are tried: noise of the cache may be as wide as that, and the widest counts.
 const LEVELS: usize = 3;
 
+/// Wider blocks are not tried where they are fewer: what they say is mostly chance, and the widest of chances would count.
+const FEWEST_BLOCKS: usize = 9;
+
 /// Sums over 2x2 blocks; `grid` is columns and rows before and after.
-fn four_to_one(blocks: &[[f64; KEPT * KEPT]], grid: &mut [usize; 2]) -> Vec<[f64; KEPT * KEPT]> {
+fn four_to_one(blocks: &[f64], grid: &mut [usize; 2]) -> Vec<f64> {
     let columns = grid[0].div_ceil(2);
-    let mut out = vec![[0.0; KEPT * KEPT]; columns * grid[1].div_ceil(2)];
+    let mut out = vec![0.0; columns * grid[1].div_ceil(2)];
     for (i, block) in blocks.iter().enumerate() {
-        let sum = &mut out[i / grid[0] / 2 * columns + i % grid[0] / 2];
-        for (sum, value) in sum.iter_mut().zip(block) {
-            *sum += value;
-        }
+        out[i / grid[0] / 2 * columns + i % grid[0] / 2] += block;
     }
     *grid = [columns, grid[1].div_ceil(2)];
     out

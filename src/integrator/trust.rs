@@ -130,7 +130,11 @@ impl Trustworthiness {
             .collect();
         let best = &self.models[0];
         let wrong = || {
-            let share = if best.beyond > 0.995 { "everywhere".into() } else { format!("on {} of the area", percent(best.beyond)) };
+            let share = if best.beyond > 0.995 {
+                "everywhere".into()
+            } else {
+                format!("on {} of the area", percent(best.beyond))
+            };
             format!("`{}` errs by more than {} {share}", best.model, percent(self.tolerance))
         };
         let verdict = match self.trusted_from {

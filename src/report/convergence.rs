@@ -1,34 +1,10 @@
 //! Error against time and against samples, of several ways to render one picture.
 
+use super::axis::{Axis, Scale};
+use super::curve::{Curve, Fit, Floor, Point, Reached};
 use super::page::{Page, Picture};
-use super::plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
+use super::plot::{COLOURS, DASHES, End, Figure, Panel, Row, Series, Stroke};
 use std::fmt::Write as _;
-
-/// One way to render, measured while it ran.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    /// As asked.
-    pub name: String,
-    /// Building its trees and tables [s]; not in the times of the points.
-    pub seconds_setup: f64,
-    /// In order of time.
-    pub points: Vec<Point>,
-}
-
-/// A measurement.
-#[derive(Clone, Copy, Debug)]
-pub struct Point {
-    /// Samples of each pixel.
-    pub samples: u32,
-    /// Time of rendering [s].
-    pub seconds: f64,
-    /// relMSE against the reference as it is, the reference's own noise in it.
-    pub measured: f64,
-    /// relMSE against its own limit, told by its halves.
-    pub own: f64,
-    /// Half of the 95 % interval of log(error / told error).
-    pub width: Option<f64>,
-}
 
 /// What the curves are measured against.
 #[derive(Clone, Debug)]
@@ -52,149 +28,57 @@ pub struct Convergence {
     pub footnotes: Vec<String>,
 }
 
-/// log(error) = intercept + slope log(x), by least squares.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
-    /// Natural logarithm of the error at x = 1.
-    pub intercept: f64,
-    /// -1 where each further sample is worth as much as the one before.
-    pub slope: f64,
-    /// Half of the 95 % interval of the slope.
-    pub half_width: f64,
-}
-
-/// What a method's curve tends to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Floor {
-    /// relMSE that does not go away with samples.
-    pub value: f64,
-    /// Half of its 95 % interval.
-    pub half_width: f64,
-}
-
-impl Floor {
-    /// Whether it is told from none.
-    pub fn is_seen(&self) -> bool {
-        self.value > self.half_width
-    }
-}
-
-impl Point {
-    /// relMSE against what the reference stands for: the reference's noise is independent, so its square is taken off.
-    /// None where it is not told from that noise.
-    pub fn error(&self, noise: f64) -> Option<f64> {
-        let error = self.measured - noise;
-        (error > 0.3 * noise && error > 0.0).then_some(error)
-    }
-}
-
-impl Fit {
-    /// Over (x, error) in ascending order of x. Errors of a growing mean go together, so the residuals count as one for
-    /// each doubling of x. None with fewer than two and a half doublings.
-    pub fn of(points: &[(f64, f64)]) -> Option<Self> {
-        let logs: Vec<(f64, f64)> = points.iter().map(|&(x, y)| (x.ln(), y.ln())).collect();
-        let doublings = (logs.last()?.0 - logs.first()?.0) / std::f64::consts::LN_2;
-        if doublings < 2.5 || logs.len() < 4 {
-            return None;
-        }
-        // Equal weight to equal ratios of x, however close the measurements are.
-        let weight = |i: usize| (logs[(i + 1).min(logs.len() - 1)].0 - logs[i.saturating_sub(1)].0) / 2.0;
-        let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
-            logs.iter().enumerate().map(|(i, &(x, y))| weight(i) * f(x, y)).sum()
-        };
-        let all = sum(&|_, _| 1.0);
-        let (mx, my) = (sum(&|x, _| x) / all, sum(&|_, y| y) / all);
-        let spread = sum(&|x, _| (x - mx).powi(2));
-        let slope = sum(&|x, y| (x - mx) * (y - my)) / spread;
-        let residual = sum(&|x, y| (y - my - slope * (x - mx)).powi(2)) / all;
-        let freedom = doublings + 1.0 - 2.0;
-        let error = (residual / freedom / (spread / all)).sqrt();
-        let student = crate::film::metrics::student_975(freedom.max(1.0) as usize);
-        Some(Self { intercept: my - slope * mx, slope, half_width: student * error })
-    }
-
-    /// The error at `x`.
-    pub fn at(&self, x: f64) -> f64 {
-        (self.intercept + self.slope * x.ln()).exp()
-    }
-
-    /// Where the error is `y`.
-    pub fn solve(&self, y: f64) -> f64 {
-        ((y.ln() - self.intercept) / self.slope).exp()
-    }
-}
-
-/// Told noise is not believed to better than this share.
-const LEAST_WIDTH: f64 = 0.3;
-
-/// Passes before the first is left out of fits: sequences begin before they spread.
-const SETTLED: u32 = 2;
+/// Errors within this factor of each other are as good as equal: times on a machine with other work vary as much.
+const AS_GOOD: f64 = 1.15;
 
 impl Convergence {
-    /// (x, error) of a curve's points that are told from the reference's noise.
-    fn line(&self, curve: &Curve, x: impl Fn(&Point) -> f64) -> Vec<(f64, f64)> {
-        curve.points.iter().filter_map(|p| Some((x(p), p.error(self.reference.noise)?))).collect()
-    }
-
     /// Fit of error against samples.
     pub fn fit_samples(&self, curve: &Curve) -> Option<Fit> {
-        let settled = Curve { points: settled(curve), ..curve.clone() };
-        Fit::of(&self.line(&settled, |p| f64::from(p.samples)))
+        curve.fit(self.reference.noise, |p| f64::from(p.samples))
     }
 
-    /// Fit of noise alone, told by the halves, against seconds.
-    fn fit_seconds(&self, curve: &Curve) -> Option<Fit> {
-        let settled = Curve { points: settled(curve), ..curve.clone() };
-        Fit::of(&self.line(&settled, |p| p.seconds))
+    /// Fit of error against seconds.
+    pub fn fit_seconds(&self, curve: &Curve) -> Option<Fit> {
+        curve.fit(self.reference.noise, |p| p.seconds)
     }
 
     /// What is left of a curve's last error when its own noise and the reference's are taken off.
     pub fn floor(&self, curve: &Curve) -> Option<Floor> {
-        let last = curve.points.last()?;
-        let value = last.measured - self.reference.noise - last.own;
-        // Told noise, the reference's noise, and the product of bias and noise, each known to some share; told noise has an
-        // error of its own while it is large, so that less than 0.3 of it is never called bias.
-        let width = last.width.unwrap_or(1.0).max(LEAST_WIDTH);
-        let parts = [width * last.own, 0.3 * self.reference.noise, width * (value.max(0.0) * last.own).sqrt()];
-        Some(Floor { value, half_width: parts.iter().map(|p| p * p).sum::<f64>().sqrt() })
+        curve.floor(self.reference.noise)
     }
 
-    /// Names of the curves by their last error, best first.
-    fn ranking(&self) -> Vec<(&Curve, f64)> {
-        let mut all: Vec<(&Curve, f64)> = self
-            .curves
-            .iter()
-            .filter_map(|c| Some((c, (c.points.last()?.measured - self.reference.noise).max(0.0))))
-            .collect();
-        all.sort_by(|a, b| a.1.total_cmp(&b.1));
-        all
+    /// The time that all curves have reached [s].
+    fn equal_seconds(&self) -> f64 {
+        self.curves.iter().filter_map(|c| c.points.last()).map(|p| p.seconds).fold(f64::INFINITY, f64::min)
     }
 
     /// What came out, in sentences.
     pub fn sentences(&self) -> Vec<String> {
-        let ranking = self.ranking();
+        let (seconds, noise) = (self.equal_seconds(), self.reference.noise);
+        // An error that is not told from the reference's noise counts as what it is below.
+        let error_at = |c: &Curve| {
+            let hidden = c.points.last().is_some_and(|p| p.error(noise).is_none());
+            c.error_at(seconds, noise).or(hidden.then_some(0.3 * noise))
+        };
+        let mut ranking: Vec<(&Curve, f64)> = self.curves.iter().filter_map(|c| Some((c, error_at(c)?))).collect();
+        ranking.sort_by(|a, b| a.1.total_cmp(&b.1));
         let mut out = Vec::new();
-        if let [(best, error), rest @ ..] = &ranking[..] {
-            let seconds = best.points.last().map_or(0.0, |p| p.seconds);
-            let unclear = if *error < 0.3 * self.reference.noise { ", as far as the reference tells" } else { "" };
-            out.push(format!(
-                "At equal time ({seconds:.1} s) {} has the smallest error{unclear}: relMSE {error:.2e}.",
-                best.name
-            ));
-            let others: Vec<String> = rest
-                .iter()
-                .map(|(c, e)| match self.fit_seconds(best).map(|f| seconds / f.solve(*e)) {
-                    Some(times) if times.is_finite() && times > 1.0 => format!(
-                        "{} has {:.1} times that error, which {} had {times:.1} times sooner",
-                        c.name,
-                        e / error.max(1e-300),
-                        best.name
-                    ),
-                    _ => format!("{} has {:.1} times that error", c.name, e / error.max(1e-300)),
-                })
-                .collect();
+        if let Some(&(best, error)) = ranking.first() {
+            let (winners, rest) = ranking.split_at(ranking.iter().take_while(|r| r.1 <= AS_GOOD * error).count());
+            out.push(winners_text(winners, seconds, noise));
+            let others: Vec<String> =
+                rest.iter().map(|&(c, e)| behind_text(c, e, (best, error), seconds, noise)).collect();
             if !others.is_empty() {
                 out.push(format!("{}.", others.join("; ")));
+            }
+        }
+        for curve in &self.curves {
+            match curve.points.first() {
+                Some(first) if first.seconds > seconds => out.push(format!(
+                    "{} needs {:.1} s for one sample of each pixel and is not compared.",
+                    curve.name, first.seconds
+                )),
+                _ => {}
             }
         }
         for curve in &self.curves {
@@ -217,11 +101,12 @@ impl Convergence {
         for curve in &self.curves {
             for p in &curve.points {
                 let error = p.error(self.reference.noise).map_or(String::new(), |e| format!("{e:.6e}"));
+                let own = p.own.map_or(String::new(), |e| format!("{e:.6e}"));
                 let width = p.width.map_or(String::new(), |w| format!("{w:.4}"));
                 let _ = writeln!(
                     out,
-                    "{},{},{:.4},{:.4},{:.6e},{error},{:.6e},{width}",
-                    curve.name, p.samples, curve.seconds_setup, p.seconds, p.measured, p.own
+                    "{},{},{:.4},{:.4},{:.6e},{error},{own},{width}",
+                    curve.name, p.samples, curve.seconds_setup, p.seconds, p.measured
                 );
             }
         }
@@ -247,7 +132,7 @@ impl Convergence {
         x: impl Fn(&Point) -> f64 + Copy,
         fit: impl Fn(&Self, &Curve) -> Option<Fit>,
     ) -> Figure {
-        let (mut series, mut fits, mut legend) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut series, mut fits, mut legend, mut ends) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let (mut xs, mut ys) = ((f64::INFINITY, 0.0_f64), (f64::INFINITY, 0.0_f64));
         for (i, curve) in self.curves.iter().enumerate() {
             let (colour, dash) = (COLOURS[i % COLOURS.len()], DASHES[i % DASHES.len()]);
@@ -270,6 +155,12 @@ impl Convergence {
                 format!("{}: slope {:.2} ± {:.2}", curve.name, f.slope, f.half_width).replace("slope -", "slope −")
             });
             series.insert(0, Series { stroke: Stroke::Band { colour }, points: band });
+            if let Some(last) = line.last() {
+                ends.push(End { y: last.1, text: curve.name.clone(), colour });
+            }
+            if line.len() <= MARKED {
+                series.push(Series { stroke: Stroke::Points { colour }, points: line.clone() });
+            }
             series.push(Series { stroke: Stroke::Line { colour, dash }, points: line });
             legend.push((Stroke::Line { colour, dash }, text));
         }
@@ -294,10 +185,11 @@ impl Convergence {
         Figure {
             title: title.into(),
             subtitle: format!("{}; bands: 95 %; dotted: fits", self.scene),
-            width: Some(640.0),
-            rows: vec![Row { height: 380.0, panels: vec![panel] }],
+            width: Some(580.0),
+            rows: vec![Row { height: 360.0, panels: vec![panel] }],
             legend,
-            footnotes: Vec::new(),
+            ends,
+            footnotes: self.footnotes.clone(),
         }
     }
 
@@ -305,7 +197,8 @@ impl Convergence {
     pub fn page(&self, crops: &[Picture], thumbnails: &[Picture]) -> Page {
         let mut page = Page::new(&format!("Error against run time: {}", self.scene));
         page.lead(&self.sentences());
-        page.figures(&self.figures().map(|f| f.to_svg()));
+        // The small print of the figures stands at the end of the page.
+        page.figures(&self.figures().map(|f| Figure { footnotes: Vec::new(), ..f }.to_svg()));
         page.heading("Numbers");
         page.text(
             "relMSE is the mean of (x − r)² / (r² + 0.01 mean(r)²) over pixels and channels. Noise is told by the two \
@@ -330,11 +223,12 @@ impl Convergence {
     fn row(&self, curve: &Curve) -> Vec<String> {
         let Some(last) = curve.points.last() else { return vec![curve.name.clone()] };
         let below = format!("below {:.1e}", 0.3 * self.reference.noise);
-        let noise = match last.width {
-            Some(w) => format!("{:.2e} (×/÷ {:.2})", last.own, w.exp()),
-            None => format!("{:.2e}", last.own),
+        let noise = match (last.own, last.width) {
+            (Some(own), Some(w)) => format!("{own:.2e} (×/÷ {:.2})", w.exp()),
+            (Some(own), None) => format!("{own:.2e}"),
+            _ => "not told".into(),
         };
-        let bias = self.floor(curve).map_or(String::new(), |f| {
+        let bias = self.floor(curve).map_or("not told".into(), |f| {
             if f.is_seen() {
                 format!("{:.2e} ± {:.0e}", f.value, f.half_width)
             } else {
@@ -350,62 +244,102 @@ impl Convergence {
             last.error(self.reference.noise).map_or(below, |e| format!("{e:.2e}")),
             noise,
             bias,
-            slope.map_or("".into(), |f| format!("{:.2} ± {:.2}", f.slope, f.half_width).replace('-', "−")),
+            slope.map_or("too short".into(), |f| format!("{:.2} ± {:.2}", f.slope, f.half_width).replace('-', "−")),
         ]
     }
 }
 
-fn settled(curve: &Curve) -> Vec<Point> {
-    curve.points.iter().filter(|p| p.samples >= SETTLED).copied().collect()
+/// Curves of no more points than this have them marked.
+const MARKED: usize = 16;
+
+fn winners_text(winners: &[(&Curve, f64)], seconds: f64, noise: f64) -> String {
+    let error = |e: f64| if e > 0.3 * noise { format!("relMSE {e:.2e}") } else { format!("relMSE below {e:.0e}") };
+    let unclear = if winners.iter().any(|w| w.1 <= 0.3 * noise) { ", as far as the reference tells" } else { "" };
+    match winners {
+        [(one, e)] => {
+            format!("At equal time ({seconds:.1} s) {} has the smallest error{unclear}: {}.", one.name, error(*e))
+        }
+        _ => {
+            let names: Vec<&str> = winners.iter().map(|w| w.0.name.as_str()).collect();
+            let errors: Vec<String> = winners.iter().map(|w| error(w.1)).collect();
+            format!(
+                "At equal time ({seconds:.1} s) {} share the smallest error{unclear}: {}.",
+                listed(&names),
+                errors.join(", ")
+            )
+        }
+    }
+}
+
+fn behind_text(curve: &Curve, e: f64, (best, error): (&Curve, f64), seconds: f64, noise: f64) -> String {
+    let times = format!("{} has {:.1} times that error", curve.name, e / error);
+    match best.reached(e, noise) {
+        Reached::At(s) if s < seconds => format!("{times}, which {} had {:.1} times sooner", best.name, seconds / s),
+        Reached::Before(s) if s < seconds => {
+            format!("{times}, which {} had more than {:.0} times sooner", best.name, (seconds / s).floor())
+        }
+        _ => times,
+    }
+}
+
+/// `a, b and c`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [front @ .., last] if !front.is_empty() => format!("{} and {last}", front.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn curve(name: &str, floor: f64, slope: f64) -> Curve {
+    /// Errors of `level` / seconds plus `floor`, a pass each `pass` seconds up to 20.
+    fn curve(name: &str, level: f64, floor: f64, pass: f64) -> Curve {
         let point = |samples: u32| {
-            let own = 0.1 * f64::from(samples).powf(slope);
-            Point { samples, seconds: 0.1 * f64::from(samples), measured: own + floor + 1e-6, own, width: Some(0.1) }
+            let seconds = pass * f64::from(samples);
+            let own = level / seconds;
+            let measured = own + floor + 1e-6;
+            Point { samples, seconds, measured, own: (samples > 1).then_some(own), width: Some(0.1) }
         };
-        Curve { name: name.into(), seconds_setup: 0.1, points: (1..200).map(point).collect() }
+        let passes = (20.0 / pass).ceil() as u32;
+        Curve { name: name.into(), seconds_setup: 0.1, points: (1..=passes).map(point).collect() }
     }
 
-    fn both() -> Convergence {
-        Convergence {
-            scene: "s".into(),
-            curves: vec![curve("fair", 0.0, -1.0), curve("biased", 5e-3, -1.0)],
-            reference: Reference { text: "r".into(), noise: 1e-6 },
-            footnotes: Vec::new(),
-        }
+    fn report(curves: Vec<Curve>) -> Convergence {
+        let reference = Reference { text: "r".into(), noise: 1e-6 };
+        Convergence { scene: "s".into(), curves, reference, footnotes: Vec::new() }
     }
 
     #[test]
-    fn slopes_are_those_put_in() {
-        let c = both();
-        let fit = c.fit_samples(&c.curves[0]).unwrap();
-        assert!((fit.slope + 1.0).abs() < 1e-6 && fit.half_width < 1e-6, "{fit:?}");
-        assert!((fit.at(10.0) / 0.01 - 1.0).abs() < 1e-6 && (fit.solve(0.01) / 10.0 - 1.0).abs() < 1e-6);
-        let biased = c.fit_samples(&c.curves[1]).unwrap();
-        assert!(biased.slope > -0.8, "{biased:?}");
+    fn sentences_say_which_to_use_and_which_are_biased() {
+        let curves = vec![
+            curve("fair", 1e-2, 0.0, 0.1),
+            curve("biased", 1e-2, 5e-3, 0.1),
+            curve("slow", 0.5, 0.0, 2.0),
+            curve("late", 0.5, 0.0, 30.0),
+        ];
+        let said = report(curves).sentences().join(" ");
+        assert!(said.contains("At equal time (20.0 s) fair has the smallest error: relMSE 5.00e-4."), "{said}");
+        assert!(said.contains("slow has 50.0 times that error, which fair had 50.0 times sooner"), "{said}");
+        assert!(said.contains("biased flattens") && !said.contains("fair flattens"), "{said}");
+        assert!(said.contains("late needs 30.0 s for one sample"), "{said}");
     }
 
     #[test]
-    fn bias_is_told_from_noise() {
-        let c = both();
-        let [fair, biased] = [0, 1].map(|i| c.floor(&c.curves[i]).unwrap());
-        assert!(!fair.is_seen() && fair.value.abs() < 1e-9, "{fair:?}");
-        assert!(biased.is_seen() && (biased.value / 5e-3 - 1.0).abs() < 1e-6, "{biased:?}");
-        let said = c.sentences().join(" ");
-        assert!(said.contains("fair has the smallest error") && said.contains("biased flattens"), "{said}");
-        assert!(!said.contains("fair flattens"), "{said}");
+    fn methods_that_are_as_good_are_named_together() {
+        let curves = vec![curve("a", 1e-2, 0.0, 0.1), curve("b", 1.05e-2, 0.0, 0.1), curve("c", 10.0, 0.0, 0.1)];
+        let said = report(curves).sentences().join(" ");
+        assert!(said.contains("a and b share the smallest error: relMSE 5.00e-4, relMSE 5.25e-4."), "{said}");
+        assert!(said.contains("c has 1000.0 times that error, which a had more than 200 times sooner"), "{said}");
     }
 
     #[test]
-    fn a_curve_below_the_noise_of_the_reference_is_not_drawn() {
-        let point = Point { samples: 1, seconds: 1.0, measured: 1.1e-3, own: 1e-4, width: None };
-        assert_eq!(point.error(1e-3), None);
-        assert!(point.error(1e-4).is_some());
-        assert!(Fit::of(&[(1.0, 1.0), (2.0, 0.5)]).is_none(), "too few doublings");
+    fn a_method_with_one_pass_is_a_mark_in_the_plot_and_a_row() {
+        let report = report(vec![curve("a", 1e-2, 0.0, 0.1), curve("late", 0.5, 0.0, 30.0)]);
+        let [seconds, _] = report.figures().map(|f| f.to_svg());
+        assert!(seconds.contains("<circle") && seconds.contains(">late</text>"), "{seconds}");
+        assert!(report.to_csv().lines().any(|l| l.starts_with("late,1,")));
+        assert_eq!(report.row(&report.curves[1])[5], "not told");
     }
 }

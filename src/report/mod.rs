@@ -1,12 +1,14 @@
 //! Numbers -> records, tables and plots. Not for: printing (`cli`), pictures (`film`), or computing what is shown.
 //! Read first: `records.rs` (one JSON line a pass; docs/records.md has the schema for users); `profile.rs` (M(r) of models
 //! against the Monte Carlo truth) with `plot.rs` (the SVG writer); `batch.rs` evaluates the rows of a CSV.
-//! `convergence.rs` (error against run time) and `comparison.rs` (models against a truth) make pages with `page.rs`.
+//! `convergence.rs` (error against run time; `curve.rs` has one method's) and `comparison.rs` (models against a truth) make pages with `page.rs`.
 
+mod axis;
 mod batch;
 mod batch_model;
 mod comparison;
 mod convergence;
+mod curve;
 mod false_colour;
 mod monte_carlo;
 mod page;
@@ -14,12 +16,14 @@ mod plot;
 mod profile;
 mod records;
 
+pub use axis::{Axis, Scale};
 pub use batch::{Batch, BatchOptions};
 pub use comparison::{Compared, ModelComparison};
-pub use convergence::{Convergence, Curve as ErrorCurve, Fit, Floor, Point as ErrorPoint, Reference};
+pub use convergence::{Convergence, Reference};
+pub use curve::{Curve as ErrorCurve, Fit, Floor, Point as ErrorPoint, Reached};
 pub use false_colour::{colour_bar, common_range, false_colours};
 pub use monte_carlo::{Bin, Run, channel_run};
 pub use page::{Page, Picture};
-pub use plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
+pub use plot::{COLOURS, DASHES, End, Figure, Panel, Row, Series, Stroke};
 pub use profile::{Curve, Profile};
 pub use records::{ErrorFigures, Record, RecordFile, SelfFigures};

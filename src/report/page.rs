@@ -35,6 +35,7 @@ p{margin:.4em 0;max-width:80ch}.lead{font-size:1.1rem}
 .figures svg{width:100%;height:auto;display:block}
 .strip{max-width:640px;margin:.6em 0;background:#fff;border:1px solid var(--line);border-radius:6px}.strip svg{width:100%;height:auto;display:block}
 .pictures{display:grid;grid-template-columns:repeat(auto-fill,minmax(200px,1fr));gap:14px}
+@media(max-width:600px){.pictures{grid-template-columns:repeat(2,1fr);gap:8px}main{padding:16px 12px 32px}.figures>div{flex-basis:100%;padding:0}}
 figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:6px;overflow:hidden}
 figure img{display:block;width:100%;height:auto;background:#000}.pixelated{image-rendering:pixelated}
 figcaption{padding:6px 10px;font-size:.9rem;overflow-wrap:anywhere}figcaption small{color:var(--dim);display:block}

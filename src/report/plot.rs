@@ -1,6 +1,7 @@
 //! Scientific plots as SVG, written by hand: panels in a grid, linear or logarithmic axes, lines and measured points.
 //! The files open in a browser and need nothing else.
 
+use super::axis::Axis;
 use super::page::escape;
 use std::fmt::Write as _;
 
@@ -17,8 +18,21 @@ pub struct Figure {
     pub rows: Vec<Row>,
     /// Entries of the legend below the panels.
     pub legend: Vec<(Stroke, String)>,
+    /// Names at the right ends of the curves of the first row's last panel.
+    pub ends: Vec<End>,
     /// Small print at the bottom.
     pub footnotes: Vec<String>,
+}
+
+/// A name beside the end of a curve.
+#[derive(Clone, Debug)]
+pub struct End {
+    /// Where the curve ends on the vertical axis.
+    pub y: f64,
+    /// The name.
+    pub text: String,
+    /// CSS colour of the curve.
+    pub colour: &'static str,
 }
 
 /// Panels side by side.
@@ -43,28 +57,6 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Lines of text in the lower left corner of the axes.
     pub notes: Vec<String>,
-}
-
-/// One axis.
-#[derive(Clone, Debug)]
-pub struct Axis {
-    /// With unit; empty for none.
-    pub label: String,
-    /// Lower end.
-    pub min: f64,
-    /// Upper end.
-    pub max: f64,
-    /// Spacing of the values.
-    pub scale: Scale,
-}
-
-/// Spacing of the values along an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Equal steps.
-    Linear,
-    /// Equal ratios; both ends are positive.
-    Log,
 }
 
 /// How a series is drawn.
@@ -109,103 +101,16 @@ const MARGIN_LEFT: f64 = 82.0;
 const MARGIN_RIGHT: f64 = 20.0;
 const GAP_X: f64 = 26.0;
 const GAP_Y: f64 = 16.0;
+/// Width of a letter of a legend or a curve's name [pixels].
+const LETTER: f64 = 7.2;
+/// Letters that a name beside a curve may have.
+const LONGEST_END: usize = 20;
+/// Least distance of two names beside curves [pixels].
+const END_STEP: f64 = 15.0;
+/// Left edge and width of a letter of the small print [pixels].
+const SMALL_LEFT: f64 = 20.0;
+const SMALL_LETTER: f64 = 5.9;
 const INK: &str = "#222222";
-
-impl Axis {
-    /// Position of `value` in 0 .. 1; `None` where it cannot be drawn.
-    fn at(&self, value: f64) -> Option<f64> {
-        let t = match self.scale {
-            Scale::Linear => (value - self.min) / (self.max - self.min),
-            Scale::Log if value > 0.0 => (value / self.min).ln() / (self.max / self.min).ln(),
-            Scale::Log => return None,
-        };
-        t.is_finite().then_some(t)
-    }
-
-    /// (value, label) of labelled ticks and values of unlabelled ones.
-    fn ticks(&self) -> (Vec<(f64, String)>, Vec<f64>) {
-        match self.scale {
-            Scale::Linear => {
-                let step = nice_step((self.max - self.min) / 4.0);
-                let first = (self.min / step).ceil() as i64;
-                let last = (self.max / step).floor() as i64;
-                let digits = (-step.log10().floor()).max(0.0) as usize;
-                let major = (first..=last).map(|i| i as f64 * step).map(|v| (v, format!("{v:.digits$}"))).collect();
-                (major, Vec::new())
-            }
-            Scale::Log => {
-                let (first, last) = (self.min.log10().ceil() as i32, self.max.log10().floor() as i32);
-                let every = ((last - first) / 8 + 1).max(1);
-                let plain = (-2..=3).contains(&first) && (-2..=3).contains(&last);
-                let (mut major, mut minor) = (Vec::new(), Vec::new());
-                for decade in first - 1..=last {
-                    let value = 10f64.powi(decade);
-                    if decade >= first {
-                        if (decade - first) % every == 0 {
-                            major.push((value, power_of_ten(decade, plain)));
-                        } else {
-                            minor.push(value);
-                        }
-                    }
-                    if every == 1 {
-                        minor.extend(
-                            (2..10).map(|k| f64::from(k) * value).filter(|v| (self.min..=self.max).contains(v)),
-                        );
-                    }
-                }
-                // Few decades: the numbers between them are needed to read anything off.
-                if major.len() < 3 {
-                    for decade in first - 1..=last {
-                        for k in [2, 5] {
-                            let value = f64::from(k) * 10f64.powi(decade);
-                            if (self.min..=self.max).contains(&value) {
-                                let label = if plain {
-                                    plain_number(value)
-                                } else {
-                                    format!("{k}·{}", power_of_ten(decade, false))
-                                };
-                                major.push((value, label));
-                            }
-                        }
-                    }
-                    minor.retain(|v| major.iter().all(|(m, _)| (v / m - 1.0).abs() > 1e-9));
-                }
-                (major, minor)
-            }
-        }
-    }
-}
-
-/// 1, 2 or 5 times a power of ten, at least `rough`.
-fn nice_step(rough: f64) -> f64 {
-    let power = 10f64.powf(rough.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * power).find(|&step| step >= rough * 0.999).unwrap_or(10.0 * power)
-}
-
-/// Without the digits that rounding adds.
-fn plain_number(value: f64) -> String {
-    let text = format!("{value:.6}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-/// The number itself, or 10 with a raised exponent.
-fn power_of_ten(decade: i32, plain: bool) -> String {
-    match decade {
-        _ if plain => format!("{}", 10f64.powi(decade)),
-        0 => "1".to_owned(),
-        1 => "10".to_owned(),
-        _ => {
-            let raised = |c: char| match c {
-                '-' => '⁻',
-                '1' => '¹',
-                '2' => '²',
-                '3' => '³',
-                digit => char::from_u32(0x2070 + digit as u32 - '0' as u32).unwrap_or(digit),
-            };
-            format!("10{}", decade.to_string().chars().map(raised).collect::<String>())
-        }
-    }
-}
 
 impl Figure {
     /// The picture as an SVG document.
@@ -223,19 +128,25 @@ impl Figure {
             let titled = row.panels.iter().any(|p| !p.title.is_empty());
             y += if titled { 34.0 } else { GAP_Y };
             let n = row.panels.len().max(1) as f64;
-            let width = (full - MARGIN_LEFT - MARGIN_RIGHT - GAP_X * (n - 1.0)) / n;
+            let right = if i == 0 { self.ends_width() } else { 0.0 };
+            let width = (full - MARGIN_LEFT - MARGIN_RIGHT - right - GAP_X * (n - 1.0)) / n;
             for (k, panel) in row.panels.iter().enumerate() {
                 let frame = Frame { x: MARGIN_LEFT + k as f64 * (width + GAP_X), y, width, height: row.height };
                 let same_y = k > 0 && row.panels[k - 1].y.label == panel.y.label;
                 panel.draw(&mut body, &frame, &format!("clip-{i}-{k}"), same_y);
+                if i == 0 && k + 1 == row.panels.len() && right > 0.0 {
+                    self.draw_ends(&mut body, &panel.y, &frame);
+                }
             }
             let labelled = row.panels.iter().any(|p| !p.x.label.is_empty());
             y += row.height + if labelled { 44.0 } else { 0.0 };
         }
         y = self.draw_legend(&mut body, y);
-        for line in &self.footnotes {
+        // Small print begins at the left edge and is broken where it would leave the picture.
+        let most = ((full - MARGIN_RIGHT - SMALL_LEFT) / SMALL_LETTER) as usize;
+        for line in self.footnotes.iter().flat_map(|line| broken(line, most)) {
             y += 17.0;
-            text(&mut body, (MARGIN_LEFT, y), 11.5, "start", "fill-opacity=\"0.75\"", line);
+            text(&mut body, (SMALL_LEFT, y), 11.5, "start", "fill-opacity=\"0.75\"", &line);
         }
         let height = y + 18.0;
         let _ = write!(
@@ -247,6 +158,33 @@ impl Figure {
         out
     }
 
+    /// Room for the names at the ends; none if there are none, or if one is too long to stand there.
+    fn ends_width(&self) -> f64 {
+        let longest = self.ends.iter().map(|e| e.text.chars().count()).max().unwrap_or(0);
+        if longest > LONGEST_END { 0.0 } else { LETTER * longest as f64 }
+    }
+
+    /// The names at the heights of their ends, moved apart where they would overlap.
+    fn draw_ends(&self, body: &mut String, axis: &Axis, f: &Frame) {
+        let mut ends: Vec<(f64, &End)> = self
+            .ends
+            .iter()
+            .filter_map(|e| Some((f.y + (1.0 - axis.at(e.y)?.clamp(0.0, 1.0)) * f.height, e)))
+            .collect();
+        ends.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let highest = |k: usize| f.y + END_STEP * k as f64;
+        let lowest = |k: usize, n: usize| f.y + f.height - END_STEP * (n - 1 - k) as f64;
+        let (mut above, n) = (f64::NEG_INFINITY, ends.len());
+        for (k, (y, _)) in ends.iter_mut().enumerate() {
+            *y = y.max(above + END_STEP).min(lowest(k, n)).max(highest(k));
+            above = *y;
+        }
+        for (y, end) in ends {
+            let style = format!("style=\"fill:{}\" font-weight=\"bold\"", end.colour);
+            text(body, (f.x + f.width + 6.0, y + 4.5), 12.5, "start", &style, &end.text);
+        }
+    }
+
     /// Entries from left to right, as many to a line as fit.
     fn draw_legend(&self, body: &mut String, top: f64) -> f64 {
         let (mut x, mut y) = (MARGIN_LEFT, top);
@@ -254,7 +192,7 @@ impl Figure {
             y += 22.0;
         }
         for (stroke, label) in &self.legend {
-            let width = 58.0 + 7.2 * label.chars().count() as f64;
+            let width = 58.0 + LETTER * label.chars().count() as f64;
             if x + width > self.width.unwrap_or(WIDTH) - MARGIN_RIGHT && x > MARGIN_LEFT {
                 x = MARGIN_LEFT;
                 y += 21.0;
@@ -406,6 +344,23 @@ impl Series {
     }
 }
 
+/// `line` in pieces of at most `most` letters, broken at spaces where there are any.
+fn broken(line: &str, most: usize) -> Vec<String> {
+    let mut out = vec![String::new()];
+    for word in line.split(' ') {
+        let long = |a: &str, b: &str| a.chars().count() + 1 + b.chars().count() > most.max(1);
+        match out.last_mut() {
+            Some(last) if last.is_empty() => last.push_str(word),
+            Some(last) if !long(last, word) => {
+                last.push(' ');
+                last.push_str(word);
+            }
+            _ => out.push(word.to_owned()),
+        }
+    }
+    out
+}
+
 fn text(body: &mut String, (x, y): (f64, f64), size: f64, anchor: &str, more: &str, content: &str) {
     let _ = writeln!(
         body,
@@ -416,17 +371,33 @@ fn text(body: &mut String, (x, y): (f64, f64), size: f64, anchor: &str, more: &s
 
 #[cfg(test)]
 mod tests {
+    use super::super::axis::Scale;
     use super::*;
 
     #[test]
-    fn ticks_are_where_readers_expect_them() {
-        let log = Axis { label: String::new(), min: 0.02, max: 3e4, scale: Scale::Log };
-        let labels: Vec<String> = log.ticks().0.into_iter().map(|t| t.1).collect();
-        assert_eq!(labels, ["10⁻¹", "1", "10", "10²", "10³", "10⁴"]);
-        let linear = Axis { label: String::new(), min: 0.0, max: 2.0, scale: Scale::Linear };
-        let labels: Vec<String> = linear.ticks().0.into_iter().map(|t| t.1).collect();
-        assert_eq!(labels, ["0.0", "0.5", "1.0", "1.5", "2.0"]);
-        assert_eq!(power_of_ten(-12, false), "10⁻¹²");
+    fn names_at_the_ends_of_curves_keep_apart() {
+        let axis = Axis { label: "y".into(), min: 1.0, max: 100.0, scale: Scale::Log };
+        let panel = Panel { title: String::new(), x: axis.clone(), y: axis, series: Vec::new(), notes: Vec::new() };
+        let end = |y: f64, text: &str| End { y, text: text.into(), colour: COLOURS[0] };
+        let figure = Figure {
+            width: Some(400.0),
+            rows: vec![Row { height: 200.0, panels: vec![panel] }],
+            ends: vec![end(1.01, "a"), end(1.0, "b"), end(1.02, "c"), end(90.0, "d")],
+            ..Figure::default()
+        };
+        let svg = figure.to_svg();
+        let height = |name: &str| -> f64 {
+            let line = svg.lines().find(|l| l.ends_with(&format!(">{name}</text>"))).unwrap();
+            line.split("y=\"").nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+        };
+        let [a, b, c, d] = ["a", "b", "c", "d"].map(height);
+        assert!(a - c >= END_STEP - 0.2 && b - a >= END_STEP - 0.2 && d < c - 100.0, "{a} {b} {c} {d}");
+    }
+
+    #[test]
+    fn small_print_is_broken_at_spaces() {
+        assert_eq!(broken("one two three", 8), ["one two", "three"]);
+        assert_eq!(broken("averylongword x", 5), ["averylongword", "x"]);
     }
 
     #[test]

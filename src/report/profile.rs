@@ -1,8 +1,9 @@
 //! M(r): what leaves a half space at distance r from a normal pencil beam, by several models, beside the Monte Carlo
 //! truth where the project has it. One table, one plot.
 
+use super::axis::{Axis, Scale};
 use super::monte_carlo::{Bin, Run, channel_run};
-use super::plot::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
+use super::plot::{COLOURS, DASHES, Figure, Panel, Row, Series, Stroke};
 use crate::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit, SingleChannel};
 use crate::math::{DVec3, Vec3};
 use crate::optics::{ChannelOptics, FresnelMoments, HalfSpace, Measured, Medium};
@@ -202,7 +203,7 @@ impl Profile {
         let title = format!("{}: radial profile", self.title);
         let g = self.medium.g;
         let subtitle = format!("η = {}, g = {}", self.medium.eta, g);
-        Figure { width: None, title, subtitle, rows, legend, footnotes }.to_svg()
+        Figure { title, subtitle, rows, legend, footnotes, ..Figure::default() }.to_svg()
     }
 
     fn panel_title(&self, c: usize) -> String {
