@@ -116,10 +116,13 @@ fn a_stored_film_is_a_truth_with_noise() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     };
     run(&["render", "scene.toml", "-q", "--model", "standard", "--seed", "9", "--spp", "16", "-o", "truth.film"]);
-    let compare = ["compare", "scene.toml", "--models", "standard,better", "--reference", "truth.film", "--time-budget"];
+    let compare =
+        ["compare", "scene.toml", "--models", "standard,better", "--reference", "truth.film", "--time-budget"];
     run(&[&compare[..], &["300ms", "-q", "-o", "out"]].concat());
     let csv = fs::read_to_string(folder.path().join("out/compare.csv")).unwrap();
-    assert!(csv.starts_with("# scene; reference: truth.film, 16 samples; its noise: relMSE ") && !csv.contains("0.000e0"));
+    assert!(
+        csv.starts_with("# scene; reference: truth.film, 16 samples; its noise: relMSE ") && !csv.contains("0.000e0")
+    );
     let number = |row: usize, column: usize| -> f64 {
         csv.lines().nth(2 + row).unwrap().split(',').nth(column).unwrap().parse().unwrap()
     };

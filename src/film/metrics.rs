@@ -300,7 +300,8 @@ mod tests {
     /// A picture 1.2 times its reference, all four halves with noise of 50 %: the square of 0.2 comes out.
     #[test]
     fn the_squared_bias_is_free_of_noise() {
-        let noise = |seed: u64, x: u32, y: u32| (hash(seed << 32 | u64::from(y * 200 + x)) >> 40) as f32 / 16_777_216.0 - 0.5;
+        let noise =
+            |seed: u64, x: u32, y: u32| (hash(seed << 32 | u64::from(y * 200 + x)) >> 40) as f32 / 16_777_216.0 - 0.5;
         let half = |seed, level: f32| Image::from_fn([200, 200], |x, y| Rgb::splat(level * (1.0 + noise(seed, x, y))));
         let (x, r) = ([half(1, 1.2), half(2, 1.2)], [half(3, 1.0), half(4, 1.0)]);
         let reference = Image::from_fn([200, 200], |_, _| Rgb::splat(1.0));
