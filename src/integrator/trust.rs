@@ -136,13 +136,13 @@ impl Trustworthiness {
             let side = if far > 0.0 { "bright" } else { "dark" };
             format!(" (light that comes through from behind: `{}` {} too {side})", best.model, percent(far.abs()))
         });
-        let wrong = || {
+        let wrong = |what: &str| {
             let share = if best.beyond > 0.995 {
                 "everywhere".into()
             } else {
                 format!("on {} of the area", percent(best.beyond))
             };
-            format!("`{}` errs by more than {} {share}", best.model, percent(self.tolerance))
+            format!("{what} errs by more than {} {share}", percent(self.tolerance))
         };
         let verdict = match self.trusted_from {
             _ if best.beyond < 0.005 => format!("trust `{}`", best.model),
@@ -150,10 +150,10 @@ impl Trustworthiness {
                 "trust `{}` where the body is thick; {} (sheets thinner than {from:.0} transport mean free paths, and what bends \
                  as sharply): there take --method volume_path",
                 best.model,
-                wrong()
+                wrong("it")
             ),
-            Some(_) => format!("trust none, the body is too thin: even {}; take --method volume_path", wrong()),
-            None => format!("trust none, whatever the thickness: even {}; take --method volume_path", wrong()),
+            Some(_) => format!("trust none, the body is too thin: even {}; take --method volume_path", wrong(&format!("`{}`", best.model))),
+            None => format!("trust none, whatever the thickness: even {}; take --method volume_path", wrong(&format!("`{}`", best.model))),
         };
         format!(
             "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). Expected to \
