@@ -24,7 +24,7 @@ fn main() {
     let tables = ["mc_profile_normal.csv", "mc_profile_slab.csv"].map(|name| whole_table(name).unwrap());
     println!("{:28} {:>8} {:>12} {:>7} {:>6} {:>6} {:>7}", "run", "paths", "chi2 / dof", "p", "z R", "z T", "s");
     let (mut all, mut freedom, mut low, mut runs, mut zs) = (0.0, 0, 1.0_f64, 0, Vec::new());
-    for row in &totals {
+    for (seed, row) in totals.iter().enumerate() {
         let (name, start) = (row.text("name"), Instant::now());
         let of = |table: &Vec<Row>| table.iter().any(|b| b.text("name") == name);
         // A half space without absorption lets light go arbitrarily far.
@@ -33,7 +33,7 @@ fn main() {
             continue;
         };
         let bins: Vec<&Row> = table.iter().filter(|b| b.text("name") == name).collect();
-        let found = profiles::against(row, &bins, paths, 11);
+        let found = profiles::against(row, &bins, paths, 11 + seed as u64);
         let text = |z: Option<f64>| z.map_or("-".into(), |z| format!("{z:.2}"));
         println!(
             "{name:28} {paths:>8} {:>6.1} / {:>3} {:>7.3} {:>6} {:>6} {:>7.1}",

@@ -173,9 +173,22 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
     let all: f64 = truth.iter().flatten().flatten().map(|s| s.mean(paths).0).sum();
     let straight: f64 = truth.iter().flatten().map(|ring| ring[0].mean(paths).0).sum();
     let (rings, mut row, mut largest) = (Rings { shape }, String::new(), 0.0_f64);
+    let mut far_row = String::new();
+    // Light that leaves far from its entry: by the far face, on the other half of a ball, beyond ten free paths.
+    let far = |face: usize, i: usize| match shape {
+        Shape::Slab { thickness, half_width } if thickness < half_width => face == 1,
+        Shape::Slab { .. } => i > 0 && ring_end(i - 1) > 9.9,
+        Shape::Ball { radius } => i > 0 && ring_end(i - 1) > 1.35 * f64::from(radius),
+    };
+    let places = || (0..2).flat_map(|face| (0..RINGS).map(move |i| (face, i))).filter(|&(face, i)| far(face, i));
+    let far_truth = places().flat_map(|(face, i)| truth[face][i]).map(|s| s.mean(paths));
+    let (far_flux, far_variance) = far_truth.fold((0.0, 0.0), |(f, v), (flux, variance)| (f + flux, v + variance));
+    // Of too little light nothing is said.
+    let far_known = far_variance.sqrt() < 0.1 * far_flux;
     for model in models(shape, medium) {
         let Some(model) = model else {
             row += ",,";
+            far_row += ",";
             continue;
         };
         let (flux, first) = model.visit(Evaluate(&rings, exitance));
@@ -190,8 +203,11 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
         }
         row += &format!(",{:.3},{:.3}", total / all, wrong / all);
         largest = largest.max(variance.sqrt() / all);
+        let far_model: f64 =
+            places().map(|(face, i)| flux[face][i] + if first { 0.0 } else { truth[face][i][1].mean(paths).0 }).sum();
+        far_row += &if far_known { format!(",{:.3}", far_model / far_flux - 1.0) } else { ",".into() };
     }
-    println!("{head},{largest:.3}{row}");
+    println!("{head},{largest:.3}{row}{far_row}");
 }
 
 fn main() {
@@ -201,9 +217,9 @@ fn main() {
     let mut shapes = vec![("half", 0.0, Shape::Slab { thickness: 400.0, half_width: 400.0 })];
     shapes.extend(SIZES.map(|h| ("slab", h, Shape::Slab { thickness: h, half_width: 400.0 })));
     shapes.extend(SIZES.map(|r| ("ball", r, Shape::Ball { radius: r })));
-    let columns = ["standard", "better", "beam", "directional", "calibrated", "normalised", "slab"]
-        .map(|model| format!(",{model}_total,{model}_l1"));
-    println!("eta,g,shape,size,alpha_prime,standard_error{}", columns.concat());
+    let names = ["standard", "better", "beam", "directional", "calibrated", "normalised", "slab"];
+    let (columns, far) = (names.map(|n| format!(",{n}_total,{n}_l1")), names.map(|n| format!(",{n}_far")));
+    println!("eta,g,shape,size,alpha_prime,standard_error{}{}", columns.concat(), far.concat());
     let medium = |albedo: f64, g: f64, eta: f64| {
         // σ_t′ = 1: σ_t (1 - α g) = 1.
         let sigma_t = 1.0 / (1.0 - albedo * g);

@@ -13,6 +13,9 @@ pub struct ExpectedError {
     /// Of the distribution: the sum of absolute errors over all rings around the beam, at least |`total`|. Light that
     /// passes unscattered is in it, for no model has it.
     pub distribution: f64,
+    /// Of the light that leaves far from its entry, signed: through the far face of a sheet, from the other half of a ball,
+    /// beyond 10 transport mean free paths on a plane. None where there is too little to tell.
+    pub far: Option<f64>,
 }
 
 /// What decides it: one channel of a medium, and the shape around a place.
@@ -90,6 +93,8 @@ pub fn expected_error(model: ModelName, calibrated: bool, place: &Place) -> Expe
         let more = g / FORWARD.1;
         error.total += more * (forward.total - plain.total);
         error.distribution += more * (forward.distribution - plain.distribution);
+        error.far =
+            error.far.zip(forward.far.zip(plain.far)).map(|(far, (with, without))| far + more * (with - without));
         error.distribution = error.distribution.max(error.total.abs()).max(0.0);
     }
     error
@@ -99,6 +104,16 @@ fn mix(a: ExpectedError, b: ExpectedError, at: f64) -> ExpectedError {
     ExpectedError {
         total: a.total + at * (b.total - a.total),
         distribution: a.distribution + at * (b.distribution - a.distribution),
+        far: match (a.far, b.far) {
+            (Some(a), Some(b)) => Some(a + at * (b - a)),
+            (a, b) => {
+                if at < 0.5 {
+                    a
+                } else {
+                    b
+                }
+            }
+        },
     }
 }
 
@@ -187,14 +202,15 @@ fn read(text: &str) -> Table {
         let mut albedos: Vec<f64> = mine().filter_map(|row| number(row, 4)).collect();
         albedos.sort_by(f64::total_cmp);
         albedos.dedup();
-        let nothing = ExpectedError { total: -1.0, distribution: 1.0 };
+        let nothing = ExpectedError { total: -1.0, distribution: 1.0, far: None };
         let mut errors = vec![vec![vec![nothing; albedos.len()]; 1 + 2 * SIZES.len()]; MODELS.len()];
         for row in mine() {
             let Some(albedo) = albedos.iter().position(|&a| number(row, 4) == Some(a)) else { continue };
             for (column, errors) in errors.iter_mut().enumerate() {
                 let cell = |k: usize| number(row, KEYS + 2 * column + k);
+                let far = number(row, KEYS + 2 * MODELS.len() + column);
                 if let (Some(total), Some(distribution)) = (cell(0), cell(1)) {
-                    errors[shape(row)][albedo] = ExpectedError { total, distribution };
+                    errors[shape(row)][albedo] = ExpectedError { total, distribution, far };
                 }
             }
         }
@@ -241,6 +257,8 @@ mod tests {
                     close(error.total, cells[2 * k]) && close(error.distribution, cells[2 * k + 1]),
                     "{head} {error:?}"
                 );
+                let far = cells[2 * MODELS.len() + k];
+                assert!(error.far.map_or(far.is_nan(), |e| close(e, far)), "{head} {error:?} {far}");
             }
         }
     }

@@ -24,7 +24,9 @@ pub struct ModelOnBody {
     pub total: f64,
     /// Expected error of the distribution, mean over the area.
     pub distribution: f64,
-    /// Share of the area where that is beyond the tolerance.
+    /// Of the light that leaves far from its entry, signed, mean over the area: what counts where a body is lit from behind.
+    pub far: Option<f64>,
+    /// Share of the area where the error of the distribution is beyond the tolerance.
     pub beyond: f64,
 }
 
@@ -91,6 +93,7 @@ impl Trustworthiness {
                     chosen: model == own,
                     total: errors.iter().map(|e| e.total).sum::<f64>() / n,
                     distribution: errors.iter().map(|e| e.distribution).sum::<f64>() / n,
+                    far: mean(errors.iter().filter_map(|e| e.far)),
                     beyond: errors.iter().filter(|e| e.distribution > tolerance).count() as f64 / n,
                 }
             })
@@ -129,13 +132,17 @@ impl Trustworthiness {
             .map(|m| format!("`{}` {}{}", m.model, percent(m.distribution), if m.chosen { " (chosen)" } else { "" }))
             .collect();
         let best = &self.models[0];
-        let wrong = || {
+        let behind = best.far.map_or(String::new(), |far| {
+            let side = if far > 0.0 { "bright" } else { "dark" };
+            format!(" (light that comes through from behind: `{}` {} too {side})", best.model, percent(far.abs()))
+        });
+        let wrong = |what: &str| {
             let share = if best.beyond > 0.995 {
                 "everywhere".into()
             } else {
                 format!("on {} of the area", percent(best.beyond))
             };
-            format!("`{}` errs by more than {} {share}", best.model, percent(self.tolerance))
+            format!("{what} errs by more than {} {share}", percent(self.tolerance))
         };
         let verdict = match self.trusted_from {
             _ if best.beyond < 0.005 => format!("trust `{}`", best.model),
@@ -143,19 +150,24 @@ impl Trustworthiness {
                 "trust `{}` where the body is thick; {} (sheets thinner than {from:.0} transport mean free paths, and what bends \
                  as sharply): there take --method volume_path",
                 best.model,
-                wrong()
+                wrong("it")
             ),
-            Some(_) => format!("trust none, the body is too thin: even {}; take --method volume_path", wrong()),
-            None => format!("trust none, whatever the thickness: even {}; take --method volume_path", wrong()),
+            Some(_) => format!("trust none, the body is too thin: even {}; take --method volume_path", wrong(&format!("`{}`", best.model))),
+            None => format!("trust none, whatever the thickness: even {}; take --method volume_path", wrong(&format!("`{}`", best.model))),
         };
         format!(
             "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). Expected to \
-             be wrong by, where light is not far from its entry, mean over the area: {}. So {verdict}",
+             be wrong by, mean over the area: {}{behind}. So {verdict}",
             self.object,
             self.material,
             listed.join(", ")
         )
     }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.fold((0.0, 0), |(sum, count), v| (sum + v, count + 1));
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 fn name((model, calibrated): (ModelName, bool)) -> String {
