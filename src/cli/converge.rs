@@ -143,6 +143,9 @@ fn write_report(
     }
     crops.push(picture(&truth.cropped(part), "reference", String::new(), true)?);
     thumbnails.push(picture(&truth.shrunk(THUMBNAIL), "reference", String::new(), false)?);
+    if part == truth.window {
+        thumbnails.clear();
+    }
     args.write("index.html", &report.page(&crops, &thumbnails).to_html())
 }
 

@@ -88,6 +88,28 @@ pub struct ProgressDisplay {
     shown: Shown,
     own: OwnError,
     target: Option<f64>,
+    trend: Trend,
+}
+
+/// How fast the error falls: one over the passes in the long run, faster while a sequence spreads out.
+#[derive(Clone, Copy, Debug, Default)]
+struct Trend {
+    /// Passes and error at about a quarter to a half of the passes, then at a half to all.
+    seen: [Option<(u32, f64)>; 2],
+}
+
+impl Trend {
+    /// Takes an error and gives the share of the work to `target` that is done, in time.
+    fn share(&mut self, passes: u32, error: f64, target: f64) -> f64 {
+        if self.seen[1].is_none_or(|last| passes >= 2 * last.0) {
+            self.seen = [self.seen[1], Some((passes, error))];
+        }
+        let slope = match self.seen.iter().flatten().find(|then| then.0 < passes) {
+            Some(then) => (then.1 / error).ln() / (f64::from(passes) / f64::from(then.0)).ln(),
+            None => 1.0,
+        };
+        (target / error).min(1.0).powf(1.0 / slope.clamp(1.0, 2.0))
+    }
 }
 
 enum Shown {
@@ -113,7 +135,7 @@ impl ProgressDisplay {
         } else {
             Shown::Lines(0)
         };
-        Self { shown, own, target }
+        Self { shown, own, target, trend: Trend::default() }
     }
 
     /// Takes the bar off the screen.
@@ -123,12 +145,13 @@ impl ProgressDisplay {
         }
     }
 
-    /// The share of the job that is done, by whichever limit comes first; an error falls as one over the passes.
-    fn fraction_done(&self, progress: &Progress<'_>) -> f64 {
+    /// The share of the job that is done, by whichever limit comes first.
+    fn fraction_done(&mut self, progress: &Progress<'_>) -> f64 {
         let by_passes = progress.job.passes.map_or(0.0, |n| f64::from(progress.film.passes()) / f64::from(n));
         let by_time = progress.job.time.map_or(0.0, |t| progress.seconds.total() / t.as_secs_f64());
         let own = self.own.get().and_then(|own| own.relmse_careful);
-        let by_error = self.target.zip(own).map_or(0.0, |(target, own)| target / own);
+        let passes = progress.film.passes();
+        let by_error = self.target.zip(own).map_or(0.0, |(target, own)| self.trend.share(passes, own, target));
         by_passes.max(by_time).max(by_error).min(1.0)
     }
 }
@@ -229,4 +252,31 @@ pub fn error_figures(image: &Image, reference: &Image) -> Result<ErrorFigures> {
         relmse: errors.relmse.map(|e| e.value),
         interval: errors.relmse.and_then(|e| e.interval),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_to_an_error_follows_its_slope() {
+        for slope in [1.0_f64, 1.5] {
+            let mut trend = Trend::default();
+            let share = |trend: &mut Trend, n: u32| trend.share(n, f64::from(n).powf(-slope), 100_f64.powf(-slope));
+            // The first error has no slope yet and is taken to fall as one over the passes.
+            assert!((share(&mut trend, 2) - 0.02_f64.powf(slope)).abs() < 1e-9);
+            for n in 3..100 {
+                assert!((share(&mut trend, n) - f64::from(n) / 100.0).abs() < 1e-9, "{slope} {n}");
+            }
+            assert_eq!(share(&mut trend, 120), 1.0);
+        }
+    }
+
+    #[test]
+    fn an_error_that_rises_or_falls_by_chance_does_not_run_away() {
+        let mut trend = Trend::default();
+        trend.share(2, 1e-2, 1e-3);
+        assert_eq!(trend.share(3, 2e-2, 1e-3), 0.05);
+        assert!((trend.share(4, 1e-6, 1e-7) - 0.1_f64.sqrt()).abs() < 1e-12);
+    }
 }

@@ -222,11 +222,15 @@ impl Together {
 
     /// Half of the 95 % interval of log(T / S); none without noise.
     fn log_width(self) -> Option<f64> {
-        let width =
-            student_975(self.freedom.max(1.0) as usize) * 2.0 / (self.independent / CLOSER - 1.0).max(1.0).sqrt();
+        let width = student_975(self.freedom.max(FEWEST_FREEDOM) as usize) * 2.0
+            / (self.independent / CLOSER - 1.0).max(1.0).sqrt();
         self.independent.is_finite().then_some(width)
     }
 }
+
+/// Degrees of freedom at the least: one block with most of what is shared looks like one, but that too is chance, and Student's
+/// factor for one is so large that it says nothing.
+const FEWEST_FREEDOM: f64 = 2.0;
 
 /// Blocks of 1, 2 and 4 times the side are tried: noise of the cache may be as wide as that, and the widest counts.
 const LEVELS: usize = 3;

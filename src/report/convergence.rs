@@ -137,9 +137,9 @@ impl Convergence {
         for (i, curve) in self.curves.iter().enumerate() {
             let (colour, dash) = (COLOURS[i % COLOURS.len()], DASHES[i % DASHES.len()]);
             let (mut line, mut band) = (Vec::new(), Vec::new());
-            for p in &curve.points {
+            for (p, width) in curve.points.iter().zip(curve.steady_widths()) {
                 let Some(error) = p.error(self.reference.noise) else { continue };
-                let (low, high) = p.width.map_or((error, error), |w| (error * (-w).exp(), error * w.exp()));
+                let (low, high) = width.map_or((error, error), |w| (error * (-w).exp(), error * w.exp()));
                 line.push((x(p), error, 0.0));
                 band.push((x(p), low, high));
                 xs = (xs.0.min(x(p)), xs.1.max(x(p)));
@@ -193,7 +193,7 @@ impl Convergence {
         }
     }
 
-    /// The page; `pictures` are crops at equal time, `thumbnails` the whole pictures.
+    /// The page; `crops` are parts of the pictures at equal time, `thumbnails` the whole ones, if the parts are not that.
     pub fn page(&self, crops: &[Picture], thumbnails: &[Picture]) -> Page {
         let mut page = Page::new(&format!("Error against run time: {}", self.scene));
         page.lead(&self.sentences());
@@ -212,8 +212,10 @@ impl Convergence {
         page.heading("At equal time");
         page.text("The same part of each picture, pixel by pixel, when all had used the same time.");
         page.pictures(crops);
-        page.heading("Whole pictures");
-        page.pictures(thumbnails);
+        if !thumbnails.is_empty() {
+            page.heading("Whole pictures");
+            page.pictures(thumbnails);
+        }
         page.heading("How it was made");
         page.small(&[format!("Reference: {}.", self.reference.text)]);
         page.small(&self.footnotes);

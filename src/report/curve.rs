@@ -110,6 +110,9 @@ const LEAST_WIDTH: f64 = 0.3;
 /// Passes before these are left out of fits: sequences begin before they spread.
 const SETTLED: u32 = 2;
 
+/// Widths are steadied over points with up to this times the samples, and as many fewer.
+const STEADY: f64 = 1.3;
+
 /// A curve is continued by 1 / time as far as this times its length.
 const CONTINUED: f64 = 1.5;
 
@@ -123,6 +126,21 @@ impl Curve {
     pub(super) fn fit(&self, noise: f64, x: impl Fn(&Point) -> f64) -> Option<Fit> {
         let points = self.points.iter().filter(|p| p.samples >= SETTLED);
         Fit::of(&points.filter_map(|p| Some((x(p), p.error(noise)?))).collect::<Vec<_>>())
+    }
+
+    /// The width of each point as it is drawn: the median over the points around. A width is itself an estimate, of one
+    /// picture, and now and then far off.
+    pub(super) fn steady_widths(&self) -> Vec<Option<f64>> {
+        let at = |p: &Point| {
+            let near = |q: &&Point| {
+                let ratio = f64::from(q.samples) / f64::from(p.samples);
+                (1.0 / STEADY..=STEADY).contains(&ratio)
+            };
+            let mut widths: Vec<f64> = self.points.iter().filter(near).filter_map(|q| q.width).collect();
+            widths.sort_by(f64::total_cmp);
+            p.width.map(|_| widths[widths.len() / 2])
+        };
+        self.points.iter().map(at).collect()
     }
 
     /// The error after `seconds`: on straight lines between the logarithms, beyond the last point by 1 / time. None
@@ -201,6 +219,15 @@ mod tests {
         let [fair, biased] = [0.0, 5e-3].map(|floor| curve(floor, -1.0).floor(1e-6).unwrap());
         assert!(!fair.is_seen() && fair.value.abs() < 1e-9, "{fair:?}");
         assert!(biased.is_seen() && (biased.value / 5e-3 - 1.0).abs() < 1e-6, "{biased:?}");
+    }
+
+    #[test]
+    fn a_width_that_is_far_off_is_not_drawn() {
+        let mut curve = curve(0.0, -1.0);
+        curve.points[100].width = Some(3.0);
+        curve.points[0].width = None;
+        let drawn = curve.steady_widths();
+        assert_eq!((drawn[0], drawn[1], drawn[100]), (None, Some(0.1), Some(0.1)));
     }
 
     #[test]
