@@ -8,7 +8,7 @@ mod single;
 mod subsurface;
 mod volume_path;
 
-use crate::cache::GatherTally;
+use crate::cache::{Clock, GatherTally};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray, RayQuery, RayTally};
@@ -33,7 +33,7 @@ impl View<'_> {
     fn camera_hits(&self, rays: &[CameraRay], tally: &mut Tally) -> Vec<Option<Hit>> {
         let rays: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
         let mut hits = vec![None; rays.len()];
-        self.rays.closest_batch(&rays, &mut hits);
+        Clock::time(&mut tally.clock.rays, || self.rays.closest_batch(&rays, &mut hits));
         tally.rays.camera += rays.len() as u64;
         hits
     }
@@ -55,7 +55,7 @@ pub struct CameraRay {
 }
 
 /// What the work cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Tally {
     /// Rays by kind.
@@ -64,6 +64,8 @@ pub struct Tally {
     pub gather: GatherTally,
     /// Paths inside media.
     pub walk: WalkTally,
+    /// Where the time went.
+    pub clock: Clock,
 }
 
 /// What paths inside media cost.
@@ -106,6 +108,7 @@ impl std::ops::AddAssign for Tally {
         self.rays += other.rays;
         self.gather += other.gather;
         self.walk += other.walk;
+        self.clock += other.clock;
     }
 }
 

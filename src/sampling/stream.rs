@@ -79,6 +79,13 @@ impl PixelStream {
         })
     }
 
+    /// The same sample's numbers for another purpose, scrambled on their own.
+    #[inline]
+    #[must_use]
+    pub fn aside(&self, purpose: u64) -> Self {
+        Self { key: hash_combine(self.key, purpose | 1 << 41), index: self.index, dimension: 0 }
+    }
+
     /// Goes on to dimensions that no earlier [`Self::split`] of this stream has used.
     #[inline]
     pub fn skip_split(&mut self) {
