@@ -2,6 +2,7 @@
 //! over media from clear to stiff.
 //!
 //!     cargo bench --features embree --bench converge_estimators
+//!     MARMOR_BENCH_FAMILY=1 cargo bench --features embree --bench converge_estimators      # the family of media alone
 //!     MARMOR_BENCH_SCENE=scene.toml MARMOR_BENCH_SECONDS=20 MARMOR_BENCH_SVG=plot.svg cargo bench ... --bench converge_estimators
 //!
 //! Errors are relMSE over pixels that lie wholly on an object, without the worst 0.1 %, against a picture by `cut` of
@@ -150,10 +151,15 @@ fn main() {
     let begin = Instant::now();
     let (name, loaded) = match std::env::var("MARMOR_BENCH_SCENE") {
         Ok(path) => (path.clone(), Scene::load(&SceneFile::read(path.as_ref()).unwrap()).unwrap()),
-        Err(_) => ("a bumpy ball of skim milk".into(), scene("type = \"translucent\"\npreset = \"skimmilk\"\nexit_normalisation = false\n")),
+        Err(_) => (
+            "a bumpy ball of skim milk".into(),
+            scene("type = \"translucent\"\npreset = \"skimmilk\"\nexit_normalisation = false\n"),
+        ),
     };
     println!("{name}: loaded in {:.2} s, {} threads", begin.elapsed().as_secs_f64(), rayon::current_num_threads());
-    with_bench(&loaded, |bench| race(bench, &name, seconds));
+    if std::env::var_os("MARMOR_BENCH_FAMILY").is_none() {
+        with_bench(&loaded, |bench| race(bench, &name, seconds));
+    }
     if std::env::var_os("MARMOR_BENCH_SCENE").is_none() {
         stiff(seconds / 4.0);
     }

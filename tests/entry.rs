@@ -158,7 +158,7 @@ impl Set {
             let mut sums = vec![Rgb::BLACK; exits.len()];
             let (mut rays, mut gather) = (RayTally::default(), GatherTally::default());
             near.add(&filler, exits, &streams, (&mut rays, &mut gather, &mut Clock::default()), &mut sums);
-            assert!(gather.near == gather.near_points * exits.len() as u64 && gather.non_finite == 0);
+            assert!(gather.near <= gather.near_points * exits.len() as u64 && gather.non_finite == 0);
             sums
         };
         let own: Vec<Vec<Rgb>> = (0..runs).map(own).collect();

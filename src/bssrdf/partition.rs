@@ -24,14 +24,18 @@ impl Partition {
         Self { middle: 1.0, ..Self::beyond(radius) }
     }
 
-    /// The part's share of S_d at √`r2` [unit]. Of the far part r²(2R² - r²)/R⁴ up to the radius R, then 1; of the near
-    /// part what that leaves, beyond R exactly 0.
+    /// The part's share of S_d at √`r2` [unit]. Of the far part 0 up to half the radius R, then t²(3 - 2t) with t the part
+    /// of the way from R²/4 to R², then 1; of the near part what that leaves, beyond R exactly 0.
     #[inline(always)]
     pub fn share(self, r2: f32) -> f32 {
         let q = r2 * self.inverse;
         // Also where 0 · ∞ is not a number.
         let q = if q < 1.0 { q } else { 1.0 };
-        (self.middle - q * (2.0 - q)).abs()
+        let t = (q - 0.25) * (4.0 / 3.0);
+        let t = if t > 0.0 { t } else { 0.0 };
+        // Rounding of 4/3 must not leave a rest beyond the radius.
+        let t = if q < 1.0 { t } else { 1.0 };
+        (self.middle - t * t * (3.0 - 2.0 * t)).abs()
     }
 
     /// [`Self::share`] for a source that light reached along `travelled` [unit] inside: far where a surface point beyond the

@@ -31,13 +31,19 @@ impl Columns {
     /// `samples` for `model`, in their order.
     pub fn of(model: &Model, samples: &[CachedSample]) -> Self {
         let mut all = Self::new(model);
-        for column in &mut all.columns[..all.used] {
+        all.refill(model, samples);
+        all
+    }
+
+    /// Becomes `samples`, in their order; `model` is that of the columns.
+    pub fn refill(&mut self, model: &Model, samples: &[CachedSample]) {
+        for column in &mut self.columns[..self.used] {
+            column.clear();
             column.reserve_exact(samples.len());
         }
         for sample in samples {
-            all.push_sample(model, sample);
+            self.push_sample(model, sample);
         }
-        all
     }
 
     /// Entry points and weights alone.

@@ -23,12 +23,14 @@ const FIRST: u32 = (127 - OCTAVES) << (23 - SHIFT);
 /// Share of the samples that is spread evenly over the rings, lest a model differ from the envelope.
 const EVEN: f64 = 0.1;
 /// Lines parallel to the normal of an exit.
-const LINES: u32 = 2;
+const LINES: u32 = 8;
+/// Points of the lights that shine at each surface found: a shadow ray costs less than a line.
+const LIGHTS: u32 = 2;
 /// Number of lines parallel to each axis on average, the normal first: on a plane that alone finds all, steep walls need the
 /// others.
-const AXES: [f32; 3] = [LINES as f32, 0.25, 0.25];
+const AXES: [f32; 3] = [LINES as f32, 0.5, 0.5];
 /// Neighbouring exits that share what their lines find.
-const GROUP: usize = 32;
+const GROUP: usize = 8;
 /// Surfaces that one line finds at most.
 const MOST_HITS: u32 = 64;
 /// What the numbers of lines parallel to the normal are for, and of those parallel to a tangent.
@@ -59,6 +61,8 @@ struct Line {
 
 /// Light that may enter at a point.
 struct Candidate {
+    /// Number of the surface that a line met.
+    surface: u32,
     at: SurfacePoint,
     sample: CachedSample,
     shadow: Option<Ray>,
@@ -116,6 +120,8 @@ impl NearField {
         sums: &mut [Rgb],
     ) {
         let (start, before) = (Instant::now(), clock.rays);
+        let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model));
+        let mut picked = Vec::new();
         for ((exits, streams), sums) in exits.chunks(GROUP).zip(streams.chunks(GROUP)).zip(sums.chunks_mut(GROUP)) {
             let middle = |exit: &Exit| {
                 let frame = Frame::about(exit.n);
@@ -125,11 +131,16 @@ impl NearField {
             let candidates = self.along(filler, self.lines(&middles, streams), (&mut *rays, &mut *clock));
             let found = self.lit(filler, &middles, candidates, (&mut *rays, &mut *gather, &mut *clock));
             gather.near_points += found.len() as u64;
-            gather.near += (found.len() * exits.len()) as u64;
-            let columns = Columns::of(filler.model, &found);
+            all.refill(filler.model, &found);
             for (exit, sum) in exits.iter().zip(sums) {
-                let own = columns.sum(filler.model, exit, self.partition, &mut gather.clamped);
-                *sum += Rgb::from_fn(|c| own[c] as f32);
+                // Beyond the radius the share is 0.
+                let within = |s: &CachedSample| s.entry.x.distance_squared(exit.x) < self.radius * self.radius;
+                picked.clear();
+                picked.extend((0_u32..).zip(&found).filter(|(_, s)| within(s)).map(|(i, _)| (i, 1.0)));
+                gather.near += picked.len() as u64;
+                own.pick(&all, &picked);
+                let value = own.sum(filler.model, exit, self.partition, &mut gather.clamped);
+                *sum += Rgb::from_fn(|c| value[c] as f32);
             }
         }
         clock.near += start.elapsed().as_secs_f64() - (clock.rays - before);
@@ -171,6 +182,7 @@ impl NearField {
         (rays, clock): (&mut RayTally, &mut Clock),
     ) -> Vec<Candidate> {
         let mut candidates = Vec::with_capacity(lines.len());
+        let mut surface = 0;
         let (mut asked, mut hits): (Vec<Ray>, Vec<Option<Hit>>) = (Vec::new(), Vec::new());
         for _ in 0..MOST_HITS {
             asked.clear();
@@ -187,11 +199,15 @@ impl NearField {
                 let again = line.last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
                 if !again && hit.mesh == filler.object {
                     let at = filler.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
-                    let [[u, v], [pick, share]] = [line.numbers.next_2d(), line.numbers.next_2d()];
-                    let depth = line.numbers.next_1d();
+                    surface += 1;
+                    for part in 0..LIGHTS {
+                        let mut numbers = line.numbers.split(part, LIGHTS);
+                        let ([u, v, pick, share], depth) = (numbers.next_4d(), numbers.next_1d());
+                        // The lights have the first two numbers, which are spread best: their noise is the largest.
+                        let entering = filler.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], rays);
+                        candidates.extend(entering.map(|(sample, shadow)| Candidate { surface, at, sample, shadow }));
+                    }
                     line.numbers.skip_split();
-                    let entering = filler.entering(at, 1.0, [pick, u, v, share, depth], rays);
-                    candidates.extend(entering.map(|(sample, shadow)| Candidate { at, sample, shadow }));
                 }
                 true
             });
@@ -215,21 +231,27 @@ impl NearField {
         Clock::time(&mut clock.rays, || filler.rays.occluded_batch(&shadows, &mut hidden));
         rays.shadow += shadows.len() as u64;
         let mut hidden = hidden.into_iter();
-        let mut found = Vec::with_capacity(candidates.len());
-        for Candidate { at, mut sample, shadow } in candidates {
+        let mut found: Vec<CachedSample> = Vec::with_capacity(candidates.len());
+        let (mut last, mut density) = (0, 0.0);
+        // Where the distance alone decides, all light at one point is one sample.
+        let joined = filler.model.gather().is_some();
+        for Candidate { surface, at, mut sample, shadow } in candidates {
             if shadow.is_some() && hidden.next() == Some(true) {
                 continue;
             }
-            let density = self.density(middles, &at);
+            let again = std::mem::replace(&mut last, surface) == surface;
+            if !again {
+                density = self.density(middles, &at);
+            }
             // At the rim of the near field, by rounding; its share is 0 there.
             if density == 0.0 {
                 continue;
             }
             sample.flux *= 1.0 / density;
-            if sample.is_finite() {
-                found.push(sample);
-            } else {
-                gather.non_finite += 1;
+            match found.last_mut().filter(|_| again && joined) {
+                _ if !sample.is_finite() => (gather.non_finite, last) = (gather.non_finite + 1, 0),
+                Some(same) => same.flux += sample.flux,
+                None => found.push(sample),
             }
         }
         found
@@ -254,8 +276,7 @@ impl NearField {
                 continue;
             }
             for (axis, number) in axes.iter().zip(AXES) {
-                let along = apart.dot(*axis);
-                let q = (r2 - along * along).max(0.0) * scale;
+                let q = (apart - *axis * apart.dot(*axis)).length_squared() * scale;
                 density += number * self.per_area[ring_of(q)] * at.n_geometric.dot(*axis).abs();
             }
         }

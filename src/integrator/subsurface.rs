@@ -70,7 +70,7 @@ const FAR_NOISE: f64 = 2e-3;
 /// Where the cache adds less than this, the near field is made smaller.
 const FAR_NOTHING: f64 = 1e-5;
 /// A cache beside a near field has at least so many samples.
-const FEWEST: u32 = 1024;
+const FEWEST: u32 = 4096;
 /// Sums below this share of what is typical for the object are held to the accuracy of one of this size.
 const DARK: f32 = 0.1;
 /// A cut whose nodes may be wrong by a share e adds a relative variance of about 0.001 e: with this factor a third of the
@@ -134,6 +134,11 @@ impl Subsurface {
             single: if options.single { Single::new(scene, options.seed)? } else { None },
             plans: OnceLock::new(),
         })
+    }
+
+    /// Number of bodies with a near field.
+    pub fn near_fields(&self) -> usize {
+        self.bodies.iter().flatten().filter(|body| body.near.is_some()).count()
     }
 
     /// What fills the cache of object number `object`.
@@ -267,9 +272,15 @@ impl Subsurface {
         match (&body.near, self.options.estimator) {
             (Some(near), _) => Part::built(
                 part,
-                format!("light within {:.3} is sampled for each exit, {} samples serve for the rest", near.radius(), body.samples),
+                format!(
+                    "light within {:.3} is sampled for each exit, {} samples serve for the rest",
+                    near.radius(),
+                    body.samples
+                ),
             ),
-            (None, Estimator::Notes | Estimator::Thinned) => Part::left_out(part, "the lecture's law takes the cache alone"),
+            (None, Estimator::Notes | Estimator::Thinned) => {
+                Part::left_out(part, "the lecture's law takes the cache alone")
+            }
             (None, _) => Part::left_out(part, "light comes farther than from one cached sample to the next"),
         }
     }
@@ -305,9 +316,9 @@ fn near_field(envelope: &Envelope, area: f64, options: &SubsurfaceOptions) -> (O
         return (None, most);
     }
     let radius = |samples| NEAR_RADIUS * apart2(samples).sqrt() as f32;
-    let mut samples = most;
-    while samples / 2 >= FEWEST && noise(samples / 2, Partition::beyond(radius(samples / 2))) <= FAR_NOISE {
-        samples /= 2;
+    let mut samples = FEWEST.min(most);
+    while samples < most && noise(samples, Partition::beyond(radius(samples))) > FAR_NOISE {
+        samples = samples.saturating_mul(2).min(most);
     }
     // Short lines meet fewer surfaces that do not matter.
     let mut radius = radius(samples);
