@@ -2,6 +2,7 @@
 //! over media from clear to stiff.
 //!
 //!     cargo bench --features embree --bench converge_estimators
+//!     MARMOR_BENCH_FAMILY=1 cargo bench --features embree --bench converge_estimators      # the family of media alone
 //!     MARMOR_BENCH_SCENE=scene.toml MARMOR_BENCH_SECONDS=20 MARMOR_BENCH_SVG=plot.svg cargo bench ... --bench converge_estimators
 //!
 //! Errors are relMSE over pixels that lie wholly on an object, without the worst 0.1 %, against a picture by `cut` of
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 
 use marmor::film::{Film, Image, Window, metrics::compare};
 use marmor::geometry::AreaTable;
-use marmor::integrator::{Subsurface, SubsurfaceOptions, View};
+use marmor::integrator::{Direct, Integrator, Subsurface, SubsurfaceOptions, View};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job, Spent};
 use marmor::report::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
@@ -27,7 +28,9 @@ const INTERIOR: i64 = 3;
 /// Times the budget of a contestant that the reference gets.
 const REFERENCE: f64 = 6.0;
 /// Factors on the coefficients of the stiff family.
-const STIFFNESS: [f64; 6] = [0.1, 1.0, 10.0, 100.0, 1e3, 1e4];
+const STIFFNESS: [f64; 7] = [0.1, 0.5, 2.0, 10.0, 100.0, 1e3, 1e4];
+/// Those among them that have N = A σ_tr² / 2π from 1 to 1e8, the least absorbing channel from 1.4 and the most up to 1.6e8.
+const FAMILY: std::ops::RangeInclusive<f64> = 0.5..=1e3;
 
 struct Contestant {
     name: &'static str,
@@ -73,7 +76,7 @@ fn scene(medium: &str) -> Scene {
          [[object]]\nname = \"body\"\nmesh = \"bumps.obj\"\ntransform = { scale = 30 }\nmaterial = \"milk\"\n\
          [[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [100, 120, 80]\nedge_u = [40, 0, -40]\n\
          edge_v = [-25, 40, -25]\nmaterial = \"lamp\"\n\
-         [material.lamp]\ntype = \"emissive\"\nradiance = 10\ntwo_sided = true\n[material.milk]\ntype = \"translucent\"\n";
+         [material.lamp]\ntype = \"emissive\"\nradiance = 10\ntwo_sided = true\n[material.milk]\n";
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("bumps.obj"), bumps::bumps(133)).unwrap();
     let file = SceneFile::parse(&format!("{own}{medium}"), &folder.path().join("scene.toml")).unwrap();
@@ -102,7 +105,7 @@ impl Bench<'_> {
     }
 
     /// More passes, up to `passes` in all or `seconds` in all.
-    fn go_on(&self, integrator: &Subsurface, seed: u64, run: &mut Run, passes: Option<u32>, seconds: f64) {
+    fn go_on(&self, integrator: &impl Integrator, seed: u64, run: &mut Run, passes: Option<u32>, seconds: f64) {
         let cancel = AtomicBool::new(false);
         let job = Job { seed, passes, time: Some(Duration::from_secs_f64(seconds)), cancel: &cancel };
         let outcome = render::resume(integrator, self.view, &job, &mut run.film, run.spent, &mut []).unwrap();
@@ -148,10 +151,15 @@ fn main() {
     let begin = Instant::now();
     let (name, loaded) = match std::env::var("MARMOR_BENCH_SCENE") {
         Ok(path) => (path.clone(), Scene::load(&SceneFile::read(path.as_ref()).unwrap()).unwrap()),
-        Err(_) => ("a bumpy ball of skim milk".into(), scene("preset = \"skimmilk\"\nexit_normalisation = false\n")),
+        Err(_) => (
+            "a bumpy ball of skim milk".into(),
+            scene("type = \"translucent\"\npreset = \"skimmilk\"\nexit_normalisation = false\n"),
+        ),
     };
     println!("{name}: loaded in {:.2} s, {} threads", begin.elapsed().as_secs_f64(), rayon::current_num_threads());
-    with_bench(&loaded, |bench| race(bench, &name, seconds));
+    if std::env::var_os("MARMOR_BENCH_FAMILY").is_none() {
+        with_bench(&loaded, |bench| race(bench, &name, seconds));
+    }
     if std::env::var_os("MARMOR_BENCH_SCENE").is_none() {
         stiff(seconds / 4.0);
     }
@@ -189,7 +197,7 @@ fn race(bench: &Bench<'_>, name: &str, seconds: f64) {
             run.film.passes(),
             per_exit(run.spent.tally.gather.nodes),
             per_exit(run.spent.tally.gather.evaluated),
-            per_exit(run.spent.tally.gather.near),
+            per_exit(run.spent.tally.gather.near_points),
             100.0 * run.spent.seconds.cache / run.spent.seconds.total()
         );
     }
@@ -259,13 +267,15 @@ fn plot(name: &str, contestants: &[Contestant], curves: &[Vec<(f64, f64)>], seco
     .to_svg()
 }
 
-/// Equal time for media whose light travels from across the object to less than a thousandth of it.
+/// Equal time for media whose light travels from across the object to less than a thousandth of it; then what an opaque
+/// body takes, which no sampling of light under the surface can be better than by much.
 fn stiff(seconds: f64) {
     println!("media of skim milk's colour with their coefficients times k, {seconds:.1} s of passes each:");
+    let mut family = Vec::new();
     for k in STIFFNESS {
         let list = |v: [f64; 3]| v.map(|v| format!("{}", v * k)).join(", ");
         let (s, a) = (list([0.70, 1.22, 1.90]), list([0.0014, 0.0025, 0.0142]));
-        let scene = scene(&format!("sigma_s_prime = [{s}]\nsigma_a = [{a}]\neta = 1.3\n"));
+        let scene = scene(&format!("type = \"translucent\"\nsigma_s_prime = [{s}]\nsigma_a = [{a}]\neta = 1.3\n"));
         let Surface::Translucent(t) = &scene.materials[scene.objects[0].material].surface else { continue };
         let area = AreaTable::new(&scene.objects[0].mesh).unwrap().area();
         let stiffness = t.medium.sigma_tr().0.map(|s| area * f64::from(s).powi(2) / std::f64::consts::TAU);
@@ -274,16 +284,35 @@ fn stiff(seconds: f64) {
             let options = options(Estimator::Cut, 1);
             let mut run = bench.run();
             bench.go_on(&Subsurface::new(bench.view.scene, options).unwrap(), 1, &mut run, None, seconds);
-            let gather = run.spent.tally.gather;
+            let (gather, error) = (run.spent.tally.gather, bench.error(&run.film, &reference));
             println!(
-                "    k = {k:7}: N = {:.1e} {:.1e} {:.1e}, {} passes, relMSE {:.2e}, {:.1} near-field points an exit",
+                "    k = {k:7}: N = {:.1e} {:.1e} {:.1e}, {} passes, relMSE {error:.2e}, {:.1} near-field points an exit",
                 stiffness[0],
                 stiffness[1],
                 stiffness[2],
                 run.film.passes(),
-                bench.error(&run.film, &reference),
-                gather.near as f64 / gather.exits as f64
+                gather.near_points as f64 / gather.exits as f64
             );
+            if FAMILY.contains(&k) {
+                family.push(error);
+            }
         });
     }
+    let (least, most) = family.iter().fold((f64::INFINITY, 0.0_f64), |(l, m), &e| (l.min(e), m.max(e)));
+    println!(
+        "    {} media from k = {} to {}: the largest error over the least {:.1} in relMSE, {:.1} in relative RMS",
+        family.len(),
+        FAMILY.start(),
+        FAMILY.end(),
+        most / least,
+        (most / least).sqrt()
+    );
+    with_bench(&scene("type = \"diffuse\"\nalbedo = 0.5\n"), |bench| {
+        let method = Direct::new(bench.view.scene, 1).unwrap();
+        let [mut reference, mut run] = [bench.run(), bench.run()];
+        bench.go_on(&method, 99, &mut reference, None, REFERENCE * seconds);
+        bench.go_on(&method, 1, &mut run, None, seconds);
+        let error = bench.error(&run.film, &reference.film.image());
+        println!("    opaque, `direct`: {} passes, relMSE {error:.2e}", run.film.passes());
+    });
 }

@@ -60,6 +60,17 @@ fn a_render_writes_what_it_says() {
     }
     let stats: serde_json::Value = serde_json::from_slice(&fs::read(folder.path().join("s.json")).unwrap()).unwrap();
     assert_eq!(stats["passes"], 4);
+    let clock = |key: &str| stats["clock"][key].as_f64().unwrap();
+    let seconds = |key: &str| stats["seconds"][key].as_f64().unwrap();
+    let cache = ["survey", "fill", "tree"].map(clock);
+    assert!(cache.iter().all(|s| *s > 0.0) && cache.iter().sum::<f64>() <= 1.001 * seconds("cache"), "{stats}");
+    let threads = stats["threads"].as_f64().unwrap();
+    let tiles = ["rays", "near", "gather"].map(clock);
+    assert!(tiles[0] > 0.0 && tiles[2] > 0.0, "{stats}");
+    assert!(tiles.iter().sum::<f64>() <= 1.001 * threads * seconds("gather"), "{stats}");
+    for key in ["nodes", "pairs", "evaluated", "near_points", "near"] {
+        assert!(stats["per_exit"][key].is_number(), "{key}");
+    }
     assert!(stats["parts"].as_array().unwrap().iter().any(|p| p["built"] == false));
 }
 

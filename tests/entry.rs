@@ -2,13 +2,13 @@
 #![allow(clippy::unwrap_used)] // a scene that does not load has failed
 
 use marmor::bssrdf::{Bssrdf, Exit, Model, ModelName, ModelVisitor};
-use marmor::cache::{CachedSample, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
+use marmor::cache::{CachedSample, Clock, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
 use marmor::geometry::AreaTable;
 use marmor::light::Lights;
-use marmor::math::{Rgb, Vec3, hash};
+use marmor::math::{Rgb, Vec3};
 use marmor::optics::Medium;
 use marmor::query::{self, Backend, RayQuery, RayTally};
-use marmor::sampling::{CacheStream, Points};
+use marmor::sampling::{CacheStream, PixelStream, Points};
 use marmor::scene::{EntrySampling, Scene, SceneFile, Spread};
 
 const MEDIUM: Medium = Medium { sigma_a: Rgb([0.01, 0.05, 0.2]), sigma_s: Rgb([0.5, 0.9, 2.0]), g: 0.0, eta: 1.3 };
@@ -131,10 +131,43 @@ impl ModelVisitor for Near<'_> {
     fn visit<B: Bssrdf>(self, model: &B) -> f64 {
         let Self(near, of, samples, exit) = self;
         let each = samples.iter().map(|s| {
-            let share = near.partition.near(of.apart2(&s.entry, s.depth, exit));
+            let share = near.partition.share(of.apart2(&s.entry, s.depth, exit));
             f64::from((model.eval_cached(&s.entry, s.depth, exit, 0.0) * s.flux * share).mean())
         });
         each.sum()
+    }
+}
+
+impl Set {
+    /// Where a ray from outside along -`direction` meets the ball, with a normal turned by up to `tilt`.
+    fn exit(&self, direction: Vec3, tilt: f32) -> Exit {
+        let from = direction.normalize();
+        let hit = self.rays.closest(&query::Ray::new(9.0 * from, -from)).unwrap();
+        let at = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
+        let n = (at.n_geometric + tilt * Vec3::new(0.3, -0.5, 0.8)).normalize();
+        Exit { x: at.x, n, w: at.n_geometric }
+    }
+
+    /// Mean and standard error of the near field at each of `exits`: what their lines find together, and what caches have.
+    fn near_field(&self, near: &NearField, exits: &[Exit], runs: u64) -> Vec<[[f64; 2]; 2]> {
+        let (even, stream) = (Density::even(), CacheStream::new(Points::Independent, 1, 0));
+        let filler = self.filler(&stream, &even, 0.0);
+        let own = |run: u64| {
+            let streams: Vec<PixelStream> =
+                (0..exits.len() as u64).map(|i| PixelStream::new(5, run * exits.len() as u64 + i, 3)).collect();
+            let mut sums = vec![Rgb::BLACK; exits.len()];
+            let (mut rays, mut gather) = (RayTally::default(), GatherTally::default());
+            near.add(&filler, exits, &streams, (&mut rays, &mut gather, &mut Clock::default()), &mut sums);
+            assert!(gather.near <= gather.near_points * exits.len() as u64 && gather.non_finite == 0);
+            sums
+        };
+        let own: Vec<Vec<Rgb>> = (0..runs).map(own).collect();
+        let caches: Vec<_> = (0..300).map(|i| filler.fill(i * 2000, 2000, &mut RayTally::default())).collect();
+        let both = |(i, exit): (usize, &Exit)| {
+            let cached = caches.iter().map(|c| self.model.visit(Near(near, &self.model, &c.lit, exit)) / 2000.0);
+            [statistics(own.iter().map(|sums| f64::from(sums[i].mean()))), statistics(cached)]
+        };
+        exits.iter().enumerate().map(both).collect()
     }
 }
 
@@ -144,29 +177,35 @@ fn the_near_field_is_the_part_that_the_cache_leaves_out() {
     for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
         let set = Set::new(scene(9.0, ""), name);
         let envelope = Envelope::new(&set.model, &MEDIUM);
-        let even = Density::even();
-        let stream = CacheStream::new(Points::Independent, 1, 0);
-        let filler = set.filler(&stream, &even, 0.0);
         for (radius, direction) in [(2.0, Vec3::new(0.6, 0.8, 0.0)), (8.0, Vec3::new(0.9, 0.3, 0.3)), (20.0, Vec3::X)] {
             let near = NearField::new(&envelope, radius);
-            let from = direction.normalize();
-            let hit = set.rays.closest(&query::Ray::new(9.0 * from, -from)).unwrap();
-            let at = set.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
-            let exit = Exit { x: at.x, n: at.n_geometric, w: at.n_geometric };
-            let own = statistics((0..4000).map(|i| {
-                f64::from(
-                    near.estimate(&filler, &exit, hash(i + 1), (&mut RayTally::default(), &mut GatherTally::default()))
-                        .mean(),
-                )
-            }));
-            let cached = statistics((0..300).map(|i| {
-                let cache = filler.fill(i * 2000, 2000, &mut RayTally::default());
-                set.model.visit(Near(&near, &set.model, &cache.lit, &exit)) / 2000.0
-            }));
-            assert!(apart(own, cached) < 6.0, "{} {radius}: {own:?} {cached:?}", name.name());
-            assert!(own[1] < 0.03 * own[0] && cached[1] < 0.06 * cached[0], "{own:?} {cached:?}");
+            for [own, cached] in set.near_field(&near, &[set.exit(direction, 0.0)], 12_000) {
+                assert!(apart(own, cached) < 6.0, "{} {radius}: {own:?} {cached:?}", name.name());
+                assert!(own[1] < 0.03 * own[0] && cached[1] < 0.06 * cached[0], "{own:?} {cached:?}");
+            }
         }
     }
+}
+
+/// Exits share what their lines find: side by side, at the rim of one another's near field, beyond it, and with other normals.
+#[test]
+fn exits_that_share_their_lines_have_each_its_own_near_field() {
+    let set = Set::new(scene(9.0, ""), ModelName::Standard);
+    let envelope = Envelope::new(&set.model, &MEDIUM);
+    let near = NearField::new(&envelope, 2.0);
+    let exits: Vec<Exit> = [0.0, 0.02, 0.1, 0.35, 0.4, 1.2]
+        .iter()
+        .enumerate()
+        .map(|(i, &aside)| set.exit(Vec3::new(0.6, 0.8, aside), 0.2 * i as f32))
+        .collect();
+    let found = set.near_field(&near, &exits, 8000);
+    for (i, [own, cached]) in found.iter().enumerate() {
+        assert!(apart(*own, *cached) < 6.0, "exit {i}: {own:?} {cached:?}");
+        assert!(apart([1.2 * own[0], own[1]], *cached) > 6.0, "20 % would not be noticed: {own:?} {cached:?}");
+    }
+    // Company lowers the noise.
+    let [alone, _] = set.near_field(&near, &exits[..1], 8000)[0];
+    assert!(found[0][0][1] < 0.8 * alone[1], "{:?} {alone:?}", found[0][0]);
 }
 
 fn statistics(values: impl Iterator<Item = f64>) -> [f64; 2] {

@@ -24,7 +24,7 @@ pub struct SourceColumns<'a> {
     pub travelled: &'a [f32],
     /// Flux or any other weight, per channel, times [`super::DepthLaw::weights`] of t.
     pub weight: [&'a [f32]; 3],
-    /// Only the far part is summed, by [`Partition::far_source`].
+    /// The part of S_d that is summed, by [`Partition::share_source`].
     pub partition: Partition,
 }
 
@@ -93,9 +93,9 @@ impl Kernel for Sum<'_> {
                 apart
             });
             let (below, travelled) = (block(e.below, start, count, 1.0), block(e.travelled, start, count, 1.0));
-            let (mut s, mut far) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+            let (mut s, mut part) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
             for i in 0..BLOCK {
-                far[i] = e.partition.far_source(x[i] * x[i] + y[i] * y[i] + z[i] * z[i], travelled[i]);
+                part[i] = e.partition.share_source(x[i] * x[i] + y[i] * y[i] + z[i] * z[i], travelled[i]);
             }
             for (c, lanes) in lanes.iter_mut().enumerate() {
                 if c == 0 || !self.grey {
@@ -106,8 +106,8 @@ impl Kernel for Sum<'_> {
                     }
                 }
                 let mut weight = block(e.weight[c], start, count, 0.0);
-                for (weight, far) in weight.iter_mut().zip(&far) {
-                    *weight *= far;
+                for (weight, part) in weight.iter_mut().zip(&part) {
+                    *weight *= part;
                 }
                 add(lanes, &s, &weight);
             }

@@ -48,8 +48,8 @@ impl Kernel for Sum<'_> {
             for i in 0..BLOCK {
                 let vector = |v: &[[f32; BLOCK]; 3]| DVec3::new(v[0][i].into(), v[1][i].into(), v[2][i].into());
                 let apart = self.at - vector(&x);
-                let far = e.partition.far(apart.length_squared() as f32);
-                weight.iter_mut().for_each(|w| w[i] *= far);
+                let part = e.partition.share(apart.length_squared() as f32);
+                weight.iter_mut().for_each(|w| w[i] *= part);
                 let pair = Pair::new(apart, vector(&n), vector(&w), self.n_o).columns();
                 for (column, value) in pairs.iter_mut().zip(pair) {
                     column[i] = value;

@@ -34,7 +34,7 @@ pub struct EntryColumns<'a> {
     pub z: &'a [f32],
     /// Flux or any other weight, per channel.
     pub weight: [&'a [f32]; 3],
-    /// Only the far part is summed.
+    /// The part of S_d that is summed.
     pub partition: Partition,
 }
 
@@ -263,7 +263,7 @@ impl<C: Formula> Kernel for Sum<'_, C> {
         while start < count {
             let mut block = Block::load(e, start, count, self.x);
             let r2 = block.distances(self.x);
-            block.keep_far(e.partition, &r2);
+            block.keep_part(e.partition, &r2);
             let mut s = [0.0_f32; BLOCK];
             for (c, lanes) in lanes.iter_mut().enumerate() {
                 if c == 0 || !self.grey {
@@ -315,14 +315,14 @@ impl Block {
     }
 
     #[inline(always)]
-    fn keep_far(&mut self, partition: Partition, r2: &[f32; BLOCK]) {
-        let mut far = [0.0; BLOCK];
-        for (far, &r2) in far.iter_mut().zip(r2) {
-            *far = partition.far(r2);
+    fn keep_part(&mut self, partition: Partition, r2: &[f32; BLOCK]) {
+        let mut share = [0.0; BLOCK];
+        for (share, &r2) in share.iter_mut().zip(r2) {
+            *share = partition.share(r2);
         }
         for weight in &mut self.weight {
-            for (weight, far) in weight.iter_mut().zip(&far) {
-                *weight *= far;
+            for (weight, share) in weight.iter_mut().zip(&share) {
+                *weight *= share;
             }
         }
     }

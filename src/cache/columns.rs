@@ -31,13 +31,19 @@ impl Columns {
     /// `samples` for `model`, in their order.
     pub fn of(model: &Model, samples: &[CachedSample]) -> Self {
         let mut all = Self::new(model);
-        for column in &mut all.columns[..all.used] {
+        all.refill(model, samples);
+        all
+    }
+
+    /// Becomes `samples`, in their order; `model` is that of the columns.
+    pub fn refill(&mut self, model: &Model, samples: &[CachedSample]) {
+        for column in &mut self.columns[..self.used] {
+            column.clear();
             column.reserve_exact(samples.len());
         }
         for sample in samples {
-            all.push_sample(model, sample);
+            self.push_sample(model, sample);
         }
-        all
     }
 
     /// Entry points and weights alone.
@@ -159,7 +165,7 @@ impl Columns {
     }
 
     /// Σ S_d · weight per channel over all samples, by the vectorised code of `model` where it has one; of S_d the part
-    /// that is far by `partition`, from the points of the columns. Values of S_d below zero, which count as 0, add to
+    /// `partition`, by the points of the columns. Values of S_d below zero, which count as 0, add to
     /// `clamped`.
     pub fn sum(&self, model: &Model, exit: &Exit, partition: Partition, clamped: &mut u64) -> [f64; 3] {
         let c = &self.columns;
@@ -191,11 +197,11 @@ impl Columns {
         for i in 0..self.len() {
             let entry = Entry { x: self.point(i), n: vector(LEAST, i), w: vector(LEAST + 3, i) };
             let s = slab.eval_signed(&entry, exit);
-            let far = partition.far(entry.x.distance_squared(exit.x));
+            let part = partition.share(entry.x.distance_squared(exit.x));
             let weight = self.weight(i);
             for c in 0..3 {
                 *clamped += u64::from(s[c] < 0.0 && weight[c] > 0.0);
-                sum[c] += f64::from(s[c].max(0.0) * weight[c] * far);
+                sum[c] += f64::from(s[c].max(0.0) * weight[c] * part);
             }
         }
         sum

@@ -67,7 +67,7 @@ pub struct Cut<'a> {
     pub error: f32,
     /// Sums below this are held to the accuracy of one of this size; the fourth is 0.
     pub floor: Vec4,
-    /// The part of S_d that is summed is the far one.
+    /// The part of S_d that is summed.
     pub partition: Partition,
 }
 

@@ -1,7 +1,7 @@
 //! How fast S_d falls with the distance, in a table: what decides where a cut may be coarse. Only the noise of an estimate
 //! depends on it, never its mean.
 
-use crate::bssrdf::{BetterDipole, Model, Radial};
+use crate::bssrdf::{BetterDipole, Model, Partition, Radial};
 use crate::math::Vec4;
 use crate::optics::Medium;
 
@@ -86,21 +86,21 @@ impl Envelope {
         value
     }
 
-    /// (∫ S_d dA)² / ∫ S_d² dA on a plane, the least of the channels [unit²]: the area whose light makes the noise of a
-    /// sum over samples. Infinite where no channel scatters.
-    pub fn effective_area(&self) -> f64 {
+    /// ∫ (S_d share)² dA / (∫ S_d dA)² on a plane, the largest of the channels [1/unit²], where `share` is that of
+    /// `part`: times the area of a sample the relative variance of a sum of independent ones. 0 where no channel scatters.
+    pub fn variance_per_area(&self, part: Partition) -> f64 {
         let (mut first, mut second) = ([0.0; 3], [0.0; 3]);
         for (i, fall) in self.rows.iter().enumerate() {
             let r2 = |i: usize| f64::from(f32::from_bits((self.first + i as u32) << SHIFT));
             let ring = std::f64::consts::PI * (r2(i + 1) - r2(i));
+            let share = f64::from(part.share((0.5 * (r2(i) + r2(i + 1))) as f32));
             for c in 0..3 {
                 let value = f64::from(fall.value[c]);
                 first[c] += value * ring;
-                second[c] += value * value * ring;
+                second[c] += (value * share).powi(2) * ring;
             }
         }
-        let area = |c: usize| if second[c] > 0.0 { first[c] * first[c] / second[c] } else { f64::INFINITY };
-        (0..3).map(area).fold(f64::INFINITY, f64::min)
+        (0..3).map(|c| if first[c] > 0.0 { second[c] / first[c].powi(2) } else { 0.0 }).fold(0.0, f64::max)
     }
 
     /// At the largest tabulated distance up to √`r2`, `r2` ≥ 0 [unit²].

@@ -15,7 +15,7 @@ pub struct Tuning {
     pub error: f32,
     /// Means over the samples below this are held to the accuracy of one of this size [S_d flux]; the fourth is 0.
     pub floor: Vec4,
-    /// The far part of S_d is summed; `notes` and `thinned` sum it whole.
+    /// The part of S_d that is summed; `notes` and `thinned` sum it whole.
     pub partition: Partition,
 }
 

@@ -1,6 +1,7 @@
 //! Transmitted-light points of one pass on one translucent mesh, and the estimators that gather over them.
 //! Not for: what happens at the exit (`integrator/subsurface.rs`). Read first: `fill.rs`, `notes.rs`, then `cut.rs`.
 
+mod clock;
 mod columns;
 mod cut;
 mod density;
@@ -14,6 +15,7 @@ mod tree;
 
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
+pub use clock::Clock;
 pub use columns::Columns;
 pub use cut::{Buffer, Cut, CutWork};
 pub use density::{Density, Seen, Survey, seen};
@@ -68,7 +70,9 @@ pub struct GatherTally {
     pub nodes: u64,
     /// Pairs of exit point and cached sample looked at.
     pub pairs: u64,
-    /// Points of the near field found for an exit, where S_d was evaluated.
+    /// Points of the near field found along the lines of some exits.
+    pub near_points: u64,
+    /// Pairs of an exit and a point of the near field, where S_d was evaluated.
     pub near: u64,
     /// Pairs where S_d was evaluated: those kept by rejection control, all of a plain sum, or those in a cut.
     pub evaluated: u64,
@@ -86,6 +90,7 @@ impl std::ops::AddAssign for GatherTally {
         self.nodes += other.nodes;
         self.pairs += other.pairs;
         self.evaluated += other.evaluated;
+        self.near_points += other.near_points;
         self.near += other.near;
         self.non_finite += other.non_finite;
         self.clamped += other.clamped;

@@ -1,195 +1,312 @@
 //! Light that enters close to an exit, sampled anew for each exit: for media whose light does not come as far as the next
 //! sample of a cache.
 
-use super::{CachedSample, Envelope, Filler, GatherTally};
-use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor, Partition};
+use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally};
+use crate::bssrdf::{Exit, Partition};
 use crate::geometry::SurfacePoint;
-use crate::math::{Frame, Rgb, Vec3, hash, unit_f32};
-use crate::query::{Ray, RayTally};
-use std::f32::consts::{PI, TAU};
+use crate::math::{Frame, Rgb, Vec3};
+use crate::query::{Hit, Ray, RayTally};
+use crate::sampling::PixelStream;
+use std::f32::consts::TAU;
+use std::time::Instant;
 
-/// Rings of the radial density, but for the innermost disk.
-const RINGS: usize = 80;
-/// Radius of the innermost disk, relative to the outermost.
-const INNERMOST: f32 = 1e-6;
+/// Rings of the radial density per octave of r².
+const STEPS: u32 = 4;
+/// Bits of an f32 below a step.
+const SHIFT: u32 = 23 - STEPS.trailing_zeros();
+/// Octaves of r² from the innermost disk to the outermost ring.
+const OCTAVES: u32 = 40;
+/// Rings, but for the innermost disk.
+const RINGS: usize = (OCTAVES * STEPS) as usize;
+/// Upper bits of r² of the innermost disk, where the outermost ring ends at 1.
+const FIRST: u32 = (127 - OCTAVES) << (23 - SHIFT);
 /// Share of the samples that is spread evenly over the rings, lest a model differ from the envelope.
 const EVEN: f64 = 0.1;
-/// Lines parallel to the normal.
+/// Lines parallel to the normal of an exit.
 const LINES: u32 = 8;
+/// Points of the lights that shine at each surface found: a shadow ray costs less than a line.
+const LIGHTS: u32 = 2;
 /// Number of lines parallel to each axis on average, the normal first: on a plane that alone finds all, steep walls need the
 /// others.
 const AXES: [f32; 3] = [LINES as f32, 0.5, 0.5];
-/// Steps between the numbers of one line and the next: powers of the root of x^6 = x + 1, a generalised golden ratio
-/// [Roberts 2018].
-const STEPS: [f32; 5] = [0.881_271_5, 0.776_639_4, 0.684_430_7, 0.603_168_7, 0.531_555_4];
-/// Surfaces that one probe finds at most.
+/// Neighbouring exits that share what their lines find.
+const GROUP: usize = 8;
+/// Surfaces that one line finds at most.
 const MOST_HITS: u32 = 64;
+/// What the numbers of lines parallel to the normal are for, and of those parallel to a tangent.
+const PURPOSES: [u64; 2] = [0x6e65_6172, 0x7369_6465];
 
-/// Samples of the near part of S_d on disks about an exit, projected onto the surface [King et al. 2013].
+/// Samples of the near part of S_d on disks about exits, projected onto the surface [King et al. 2013].
 pub struct NearField {
     /// What belongs to the near part.
     pub partition: Partition,
+    /// What is left for the cache.
+    pub rest: Partition,
+    /// Of the outermost ring [unit].
     radius: f32,
-    /// Outer radii of the rings [unit].
-    radii: Vec<f32>,
     /// Chance of each ring and all within it.
     cumulative: Vec<f32>,
+    /// Chance per area in each ring [1/unit²].
+    per_area: Vec<f32>,
+}
+
+/// A line to look for surfaces along.
+struct Line {
+    ray: Ray,
+    /// Its own numbers, those that placed it used up.
+    numbers: PixelStream,
+    /// The triangle that was found last.
+    last: Option<(u32, u32)>,
+}
+
+/// Light that may enter at a point.
+struct Candidate {
+    /// Number of the surface that a line met.
+    surface: u32,
+    at: SurfacePoint,
+    sample: CachedSample,
+    shadow: Option<Ray>,
+}
+
+/// An exit and its axes, the normal first.
+struct Middle {
+    x: Vec3,
+    axes: [Vec3; 3],
 }
 
 impl NearField {
     /// The near part within `radius` [unit].
     pub fn new(envelope: &Envelope, radius: f32) -> Self {
         let partition = Partition::within(radius);
-        let ratio = INNERMOST.powf(-1.0 / RINGS as f32);
-        let radii: Vec<f32> = (0..=RINGS).map(|k| radius * INNERMOST * ratio.powi(k as i32)).collect();
-        let mut mass = vec![[0.0_f64; 3]; radii.len()];
+        let square = f64::from(radius) * f64::from(radius);
+        let area = |k: usize| std::f64::consts::PI * square * (outer2(k) - if k == 0 { 0.0 } else { outer2(k - 1) });
+        let mut mass = vec![[0.0_f64; 3]; RINGS + 1];
         for (k, mass) in mass.iter_mut().enumerate() {
-            let (inner, outer) = (if k == 0 { 0.0 } else { radii[k - 1] }, radii[k]);
-            let middle2 = 0.5 * (inner * inner + outer * outer);
-            let value = envelope.at(middle2).value * partition.near(middle2) * (outer * outer - inner * inner);
-            *mass = [value.x, value.y, value.z].map(f64::from);
+            let middle2 = (0.5 * square * (outer2(k) + if k == 0 { 0.0 } else { outer2(k - 1) })) as f32;
+            let value = envelope.at(middle2).value * partition.share(middle2);
+            *mass = [value.x, value.y, value.z].map(|v| f64::from(v) * area(k));
         }
         let total: [f64; 3] = std::array::from_fn(|c| mass.iter().map(|m| m[c]).sum());
         let live = total.iter().filter(|&&t| t > 0.0).count().max(1) as f64;
-        let mut sum = 0.0;
-        let cumulative: Vec<f64> = mass
-            .iter()
-            .map(|m| {
-                let own: f64 = (0..3).filter(|&c| total[c] > 0.0).map(|c| m[c] / total[c] / live).sum();
-                sum += EVEN / mass.len() as f64 + (1.0 - EVEN) * own;
-                sum
-            })
-            .collect();
-        let cumulative = cumulative.iter().map(|c| (c / sum) as f32).collect();
-        Self { partition, radius, radii, cumulative }
-    }
-
-    /// One estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for `exit`, seeded by `key`: all surfaces found along some lines
-    /// parallel to the normal, and along one parallel to a tangent, each over the density of them all.
-    pub fn estimate(
-        &self,
-        filler: &Filler<'_>,
-        exit: &Exit,
-        key: u64,
-        (rays, gather): (&mut RayTally, &mut GatherTally),
-    ) -> Rgb {
-        let frame = Frame::about(exit.n);
-        let axes = [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a));
-        let [turn, shift, across] = [0, 1, 2].map(|i| Numbers(key).at(i));
-        let mut sum = Rgb::BLACK;
-        for line in 0..LINES {
-            // Radii in equal shares of the light, directions a golden angle apart.
-            let radius = (line as f32 + Numbers(key).at(3 + u64::from(line))) / LINES as f32;
-            let angle = (turn + line as f32 * 0.618_034).fract();
-            sum += self.probe(filler, exit, (&axes, 0), [radius, angle], (key, line), (rays, gather));
+        let chance = |m: &[f64; 3]| -> f64 {
+            let own: f64 = (0..3).filter(|&c| total[c] > 0.0).map(|c| m[c] / total[c] / live).sum();
+            EVEN / mass.len() as f64 + (1.0 - EVEN) * own
+        };
+        let whole: f64 = mass.iter().map(chance).sum();
+        let (mut sum, mut cumulative, mut per_area) = (0.0, Vec::new(), Vec::new());
+        for (k, m) in mass.iter().enumerate() {
+            let below = sum as f32;
+            sum += chance(m) / whole;
+            cumulative.push(sum as f32);
+            per_area.push((f64::from(sum as f32 - below) / area(k)) as f32);
         }
-        let tangent = 1 + usize::from(across >= 0.5);
-        sum + self.probe(filler, exit, (&axes, tangent), [shift, turn], (!key, 0), (rays, gather))
+        Self { partition, rest: Partition::beyond(radius), radius, cumulative, per_area }
     }
 
-    /// What is found along a line parallel to one of the axes.
-    fn probe(
+    /// Of the outermost ring [unit].
+    pub fn radius(&self) -> f32 {
+        self.radius
+    }
+
+    /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `exits` to `sums`; `streams`, one for each, have
+    /// its numbers. All surfaces found along lines parallel to the normals and tangents of neighbouring exits count for
+    /// each of them, over the density of all their lines together.
+    pub fn add(
         &self,
         filler: &Filler<'_>,
-        exit: &Exit,
-        (axes, chosen): (&[Vec3; 3], usize),
-        [radius, angle]: [f32; 2],
-        (key, line): (u64, u32),
-        (rays, gather): (&mut RayTally, &mut GatherTally),
-    ) -> Rgb {
-        let (axis, aside, other) = (axes[chosen], axes[(chosen + 1) % 3], axes[(chosen + 2) % 3]);
-        let r = self.ring(radius);
-        let (sin, cos) = (TAU * angle).sin_cos();
-        let middle = exit.x + (aside * cos + other * sin) * r;
-        let half = (self.radius * self.radius - r * r).max(0.0).sqrt();
-        let mut ray = Ray { origin: middle + axis * half, direction: -axis, t_min: 0.0, t_max: 2.0 * half };
-        let (mut sum, mut last, mut found) = (Rgb::BLACK, None, 0);
+        exits: &[Exit],
+        streams: &[PixelStream],
+        (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
+        sums: &mut [Rgb],
+    ) {
+        let (start, before) = (Instant::now(), clock.rays);
+        let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model));
+        let mut picked = Vec::new();
+        for ((exits, streams), sums) in exits.chunks(GROUP).zip(streams.chunks(GROUP)).zip(sums.chunks_mut(GROUP)) {
+            let middle = |exit: &Exit| {
+                let frame = Frame::about(exit.n);
+                Middle { x: exit.x, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
+            };
+            let middles: Vec<Middle> = exits.iter().map(middle).collect();
+            let candidates = self.along(filler, self.lines(&middles, streams), (&mut *rays, &mut *clock));
+            let found = self.lit(filler, &middles, candidates, (&mut *rays, &mut *gather, &mut *clock));
+            gather.near_points += found.len() as u64;
+            all.refill(filler.model, &found);
+            for (exit, sum) in exits.iter().zip(sums) {
+                // Beyond the radius the share is 0.
+                let within = |s: &CachedSample| s.entry.x.distance_squared(exit.x) < self.radius * self.radius;
+                picked.clear();
+                picked.extend((0_u32..).zip(&found).filter(|(_, s)| within(s)).map(|(i, _)| (i, 1.0)));
+                gather.near += picked.len() as u64;
+                own.pick(&all, &picked);
+                let value = own.sum(filler.model, exit, self.partition, &mut gather.clamped);
+                *sum += Rgb::from_fn(|c| value[c] as f32);
+            }
+        }
+        clock.near += start.elapsed().as_secs_f64() - (clock.rays - before);
+    }
+
+    /// The lines about some exits.
+    fn lines(&self, middles: &[Middle], streams: &[PixelStream]) -> Vec<Line> {
+        let mut lines = Vec::with_capacity(middles.len() * (LINES as usize + 1));
+        for (middle, stream) in middles.iter().zip(streams) {
+            let [along, across] = PURPOSES.map(|purpose| stream.aside(purpose));
+            lines.extend((0..LINES).filter_map(|line| self.line(middle, 0, along.split(line, LINES))));
+            let mut choice = across;
+            let u = choice.next_1d();
+            if let Some(axis) = [AXES[1], AXES[1] + AXES[2]].iter().position(|&below| u < below) {
+                choice.skip_split();
+                lines.extend(self.line(middle, axis + 1, choice));
+            }
+        }
+        lines
+    }
+
+    /// A line parallel to an axis. `None` where it only touches the sphere.
+    fn line(&self, Middle { x, axes }: &Middle, axis: usize, mut numbers: PixelStream) -> Option<Line> {
+        let [u, v] = numbers.next_2d();
+        let r2 = self.ring(u) * self.radius * self.radius;
+        let (sin, cos) = (TAU * v).sin_cos();
+        let (along, aside, other) = (axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]);
+        let middle = *x + (aside * cos + other * sin) * r2.sqrt();
+        let half = (self.radius * self.radius - r2).max(0.0).sqrt();
+        let ray = Ray { origin: middle + along * half, direction: -along, t_min: 0.0, t_max: 2.0 * half };
+        (half > 0.0).then_some(Line { ray, numbers, last: None })
+    }
+
+    /// What enters where the lines meet the object, all of them at once, surface after surface.
+    fn along(
+        &self,
+        filler: &Filler<'_>,
+        mut lines: Vec<Line>,
+        (rays, clock): (&mut RayTally, &mut Clock),
+    ) -> Vec<Candidate> {
+        let mut candidates = Vec::with_capacity(lines.len());
+        let mut surface = 0;
+        let (mut asked, mut hits): (Vec<Ray>, Vec<Option<Hit>>) = (Vec::new(), Vec::new());
         for _ in 0..MOST_HITS {
-            rays.bounce += 1;
-            let Some(hit) = filler.rays.closest(&ray) else { break };
-            // The next one may begin where this one is hit, but for rounding.
-            ray.t_min = hit.t.max(ray.t_min.next_up());
-            let again = last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
-            if again || hit.mesh != filler.object {
+            asked.clear();
+            asked.extend(lines.iter().map(|line| line.ray));
+            hits.clear();
+            hits.resize(lines.len(), None);
+            Clock::time(&mut clock.rays, || filler.rays.closest_batch(&asked, &mut hits));
+            rays.bounce += lines.len() as u64;
+            let mut hit = hits.iter();
+            lines.retain_mut(|line| {
+                let Some(Some(hit)) = hit.next() else { return false };
+                // The next one may begin where this one is hit, but for rounding.
+                line.ray.t_min = hit.t.max(line.ray.t_min.next_up());
+                let again = line.last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
+                if !again && hit.mesh == filler.object {
+                    let at = filler.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
+                    surface += 1;
+                    for part in 0..LIGHTS {
+                        let mut numbers = line.numbers.split(part, LIGHTS);
+                        let ([u, v, pick, share], depth) = (numbers.next_4d(), numbers.next_1d());
+                        // The lights have the first two numbers, which are spread best: their noise is the largest.
+                        let entering = filler.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], rays);
+                        candidates.extend(entering.map(|(sample, shadow)| Candidate { surface, at, sample, shadow }));
+                    }
+                    line.numbers.skip_split();
+                }
+                true
+            });
+            if lines.is_empty() {
+                break;
+            }
+        }
+        candidates
+    }
+
+    /// Those candidates that nothing hides, over the density of all lines.
+    fn lit(
+        &self,
+        filler: &Filler<'_>,
+        middles: &[Middle],
+        candidates: Vec<Candidate>,
+        (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
+    ) -> Vec<CachedSample> {
+        let shadows: Vec<Ray> = candidates.iter().filter_map(|c| c.shadow).collect();
+        let mut hidden = vec![false; shadows.len()];
+        Clock::time(&mut clock.rays, || filler.rays.occluded_batch(&shadows, &mut hidden));
+        rays.shadow += shadows.len() as u64;
+        let mut hidden = hidden.into_iter();
+        let mut found: Vec<CachedSample> = Vec::with_capacity(candidates.len());
+        let (mut last, mut density) = (0, 0.0);
+        // Where the distance alone decides, all light at one point is one sample.
+        let joined = filler.model.gather().is_some();
+        for Candidate { surface, at, mut sample, shadow } in candidates {
+            if shadow.is_some() && hidden.next() == Some(true) {
                 continue;
             }
-            let at = filler.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
-            let density = self.density(exit, axes, &at);
-            // Lines spread over the lights together, as they do over the surface.
-            let u =
-                std::array::from_fn(|i| (Numbers(key).at(16 + found * 8 + i as u64) + line as f32 * STEPS[i]).fract());
-            found += 1;
-            if density > 0.0
-                && let Some((sample, shadow)) = filler.entering(at, 1.0 / density, u, rays)
-            {
-                rays.shadow += u64::from(shadow.is_some());
-                if !shadow.is_some_and(|ray| filler.rays.occluded(&ray)) {
-                    sum += filler.model.visit(Share { near: self, model: filler.model, sample: &sample, exit, gather });
-                }
+            let again = std::mem::replace(&mut last, surface) == surface;
+            if !again {
+                density = self.density(middles, &at);
+            }
+            // At the rim of the near field, by rounding; its share is 0 there.
+            if density == 0.0 {
+                continue;
+            }
+            sample.flux *= 1.0 / density;
+            match found.last_mut().filter(|_| again && joined) {
+                _ if !sample.is_finite() => (gather.non_finite, last) = (gather.non_finite + 1, 0),
+                Some(same) => same.flux += sample.flux,
+                None => found.push(sample),
             }
         }
-        sum
+        found
     }
 
-    /// The radius [unit] with cumulative chance `u`, evenly by area within its ring.
+    /// The square of a radius with cumulative chance `u`, evenly by area within its ring, where the outermost one is 1.
     fn ring(&self, u: f32) -> f32 {
         let k = self.cumulative.partition_point(|&c| c <= u).min(RINGS);
-        let (low, inner) = if k == 0 { (0.0, 0.0) } else { (self.cumulative[k - 1], self.radii[k - 1]) };
+        let (low, inner2) = if k == 0 { (0.0, 0.0) } else { (self.cumulative[k - 1], outer2(k - 1) as f32) };
         let within = ((u - low) / (self.cumulative[k] - low)).clamp(0.0, 1.0);
-        let (inner2, outer2) = (inner * inner, self.radii[k] * self.radii[k]);
-        (inner2 + within * (outer2 - inner2)).sqrt()
+        inner2 + within * (outer2(k) as f32 - inner2)
     }
 
-    /// Chance per area of a disk at `r` from its middle [1/unit²].
-    fn on_disk(&self, r: f32) -> f32 {
-        let k = self.radii.partition_point(|&outer| outer <= r);
-        if k > RINGS {
-            return 0.0;
+    /// Number of times that the lines of all exits meet the surface at `at`, per area [1/unit²].
+    fn density(&self, middles: &[Middle], at: &SurfacePoint) -> f32 {
+        let scale = 1.0 / (self.radius * self.radius);
+        let mut density = 0.0;
+        for Middle { x, axes } in middles {
+            let apart = at.x - *x;
+            let r2 = apart.length_squared();
+            if r2 * scale > 1.0 {
+                continue;
+            }
+            for (axis, number) in axes.iter().zip(AXES) {
+                let q = (apart - *axis * apart.dot(*axis)).length_squared() * scale;
+                density += number * self.per_area[ring_of(q)] * at.n_geometric.dot(*axis).abs();
+            }
         }
-        let (low, inner) = if k == 0 { (0.0, 0.0) } else { (self.cumulative[k - 1], self.radii[k - 1]) };
-        (self.cumulative[k] - low) / (PI * (self.radii[k] * self.radii[k] - inner * inner))
-    }
-
-    /// Chance per area of the surface at `at`, over all axes.
-    fn density(&self, exit: &Exit, axes: &[Vec3; 3], at: &SurfacePoint) -> f32 {
-        let apart = at.x - exit.x;
-        let of = |(&axis, chance): (&Vec3, f32)| {
-            let r = (apart - axis * apart.dot(axis)).length();
-            chance * self.on_disk(r) * at.n_geometric.dot(axis).abs()
-        };
-        axes.iter().zip(AXES).map(of).sum()
+        density
     }
 }
 
-/// Uniform numbers in [0, 1) by number.
-struct Numbers(u64);
-
-impl Numbers {
-    fn at(&self, i: u64) -> f32 {
-        unit_f32((hash(self.0.wrapping_add((i + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15))) >> 32) as u32)
-    }
+/// r² at the outer edge of ring `k`, where the outermost one is 1.
+fn outer2(k: usize) -> f64 {
+    f64::from(f32::from_bits((FIRST + k as u32) << SHIFT))
 }
 
-/// S_d near(r) times flux.
-struct Share<'a> {
-    near: &'a NearField,
-    model: &'a Model,
-    sample: &'a CachedSample,
-    exit: &'a Exit,
-    gather: &'a mut GatherTally,
+/// The ring of `q` = r² in 0..=1.
+#[inline]
+fn ring_of(q: f32) -> usize {
+    let bits = q.to_bits() >> SHIFT;
+    if bits < FIRST { 0 } else { ((bits - FIRST) as usize + 1).min(RINGS) }
 }
 
-impl ModelVisitor for Share<'_> {
-    type Out = Rgb;
-    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-        let CachedSample { entry, depth, flux } = self.sample;
-        let near = self.near.partition.near(self.model.apart2(entry, *depth, self.exit));
-        if near == 0.0 {
-            return Rgb::BLACK;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rings_end_where_the_next_begins() {
+        assert!(outer2(RINGS) == 1.0);
+        for k in 0..RINGS {
+            let edge = outer2(k) as f32;
+            assert_eq!((ring_of(edge.next_down()), ring_of(edge)), (k, k + 1));
         }
-        let s = model.eval_cached(entry, *depth, self.exit, 0.0);
-        self.gather.near += 1;
-        self.gather.clamped += (0..3).filter(|&c| model.clamps() && s[c] == 0.0 && flux[c] > 0.0).count() as u64;
-        s * *flux * near
+        assert_eq!((ring_of(0.0), ring_of(1.0)), (0, RINGS));
     }
 }

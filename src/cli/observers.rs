@@ -219,6 +219,7 @@ impl Records {
             seconds_cache: seconds.cache,
             seconds_gather: seconds.gather,
             seconds_total: seconds_setup + seconds.total(),
+            clock: tally.clock,
             rays: tally.rays,
             gather: tally.gather,
             walk: tally.walk,

@@ -40,6 +40,7 @@ pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
         "parts": parts,
         "passes": film.passes(),
         "seconds": { "setup": seconds_setup, "cache": seconds.cache, "gather": seconds.gather },
+        "clock": tally.clock,
         "rays": tally.rays,
         "gather": tally.gather,
         "walk": tally.walk,
@@ -47,6 +48,8 @@ pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
             "nodes": tally.gather.nodes as f64 / exits,
             "pairs": tally.gather.pairs as f64 / exits,
             "evaluated": tally.gather.evaluated as f64 / exits,
+            "near_points": tally.gather.near_points as f64 / exits,
+            "near": tally.gather.near as f64 / exits,
         },
         "per_second": {
             "rays": per_second(tally.rays.total(), seconds.total()),

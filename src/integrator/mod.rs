@@ -11,7 +11,7 @@ mod subsurface;
 mod trust;
 mod volume_path;
 
-use crate::cache::GatherTally;
+use crate::cache::{Clock, GatherTally};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray, RayQuery, RayTally};
@@ -39,7 +39,7 @@ impl View<'_> {
     fn camera_hits(&self, rays: &[CameraRay], tally: &mut Tally) -> Vec<Option<Hit>> {
         let rays: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
         let mut hits = vec![None; rays.len()];
-        self.rays.closest_batch(&rays, &mut hits);
+        Clock::time(&mut tally.clock.rays, || self.rays.closest_batch(&rays, &mut hits));
         tally.rays.camera += rays.len() as u64;
         hits
     }
@@ -61,7 +61,7 @@ pub struct CameraRay {
 }
 
 /// What the work cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Tally {
     /// Rays by kind.
@@ -70,6 +70,8 @@ pub struct Tally {
     pub gather: GatherTally,
     /// Paths inside media.
     pub walk: WalkTally,
+    /// Where the time went.
+    pub clock: Clock,
 }
 
 /// What paths inside media cost.
@@ -112,6 +114,7 @@ impl std::ops::AddAssign for Tally {
         self.rays += other.rays;
         self.gather += other.gather;
         self.walk += other.walk;
+        self.clock += other.clock;
     }
 }
 

@@ -6,12 +6,12 @@ use super::single::Single;
 use super::{CameraRay, Integrator, Part, Tally, View};
 use crate::bssrdf::{Exit, Model, Partition};
 use crate::cache::{
-    CachedSample, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
+    CachedSample, Clock, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
 };
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
-use crate::math::{Rgb, Vec3, hash_combine};
+use crate::math::{Rgb, Vec3};
 use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
@@ -61,10 +61,16 @@ pub struct Subsurface {
     plans: OnceLock<Vec<Plan>>,
 }
 
-/// Fewer cached samples than this in the area whose light matters to an exit, and the near field is sampled for each exit.
-const NEAR_SAMPLES: f64 = 8.0;
+/// A sum over the cached samples whose relative variance would be above this, if they were independent, gets a near field.
+const NOISY: f64 = 1.0 / 8.0;
 /// Radius of the near field in distances between cached samples.
 const NEAR_RADIUS: f32 = 3.0;
+/// Relative variance that the cache may add to a near field: the fewest samples that keep to it are taken.
+const FAR_NOISE: f64 = 2e-3;
+/// Where the cache adds less than this, the near field is made smaller.
+const FAR_NOTHING: f64 = 1e-5;
+/// A cache beside a near field has at least so many samples.
+const FEWEST: u32 = 4096;
 /// Sums below this share of what is typical for the object are held to the accuracy of one of this size.
 const DARK: f32 = 0.1;
 /// A cut whose nodes may be wrong by a share e adds a relative variance of about 0.001 e: with this factor a third of the
@@ -78,7 +84,6 @@ const COARSEST: f64 = 0.2;
 /// How a body's light is gathered.
 struct Plan {
     survey: Survey,
-    near: Option<NearField>,
 }
 
 /// A translucent object.
@@ -90,6 +95,10 @@ struct Body {
     /// Of even passes and of odd ones.
     streams: [CacheStream; Turn::STREAMS],
     cosine_share: f32,
+    /// For media whose light does not come as far as the next sample of the cache.
+    near: Option<NearField>,
+    /// Cached samples a pass.
+    samples: u32,
 }
 
 impl Subsurface {
@@ -113,7 +122,8 @@ impl Subsurface {
             let envelope = Envelope::new(&model, &t.medium);
             let streams = Turn::seeds(options.seed).map(stream);
             let cosine_share = object.mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds));
-            Ok(Some(Body { medium: t.medium, model, envelope, table, streams, cosine_share }))
+            let (near, samples) = near_field(&envelope, table.area(), &options);
+            Ok(Some(Body { medium: t.medium, model, envelope, table, streams, cosine_share, near, samples }))
         };
         let bodies = scene.objects.iter().enumerate().map(body).collect::<Result<_>>()?;
         Ok(Self {
@@ -124,6 +134,11 @@ impl Subsurface {
             single: if options.single { Single::new(scene, options.seed)? } else { None },
             plans: OnceLock::new(),
         })
+    }
+
+    /// Number of bodies with a near field.
+    pub fn near_fields(&self) -> usize {
+        self.bodies.iter().flatten().filter(|body| body.near.is_some()).count()
     }
 
     /// What fills the cache of object number `object`.
@@ -159,34 +174,26 @@ impl Subsurface {
         let even = Density::even();
         let plan = |(object, (body, seen)): (usize, (&Option<Body>, Vec<Seen>))| {
             let Some(body) = body.as_ref().filter(|_| !seen.is_empty()) else {
-                return Plan { survey: Survey::none(), near: None };
+                return Plan { survey: Survey::none() };
             };
             let stream = CacheStream::new(self.options.points, !self.options.seed, object as u64);
             let filler = self.filler(view, object, body, &stream, &even);
-            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread, self.options.cache_samples);
-            Plan { survey, near: self.near(body) }
+            let survey = Survey::new(&filler, &body.envelope, &seen, self.options.spread, body.samples);
+            Plan { survey }
         };
         self.bodies.iter().zip(points).enumerate().map(plan).collect()
     }
 
-    /// The near field of media whose light does not come as far as the next sample of the cache.
-    fn near(&self, body: &Body) -> Option<NearField> {
-        let split = matches!(self.options.estimator, Estimator::All | Estimator::Cut | Estimator::Cluster);
-        let apart2 = body.table.area() / f64::from(self.options.cache_samples);
-        let sparse = body.envelope.effective_area() < NEAR_SAMPLES * apart2;
-        (split && sparse).then(|| NearField::new(&body.envelope, NEAR_RADIUS * apart2.sqrt() as f32))
-    }
-
     /// How fine the sums of pass number `pass` are.
-    fn tuning(&self, plan: &Plan, pass: u32) -> Tuning {
+    fn tuning(&self, body: &Body, plan: &Plan, pass: u32) -> Tuning {
         let passes = f64::from(pass) + 1.0;
-        let noise2 = plan.survey.noise2(passes * f64::from(self.options.cache_samples));
+        let noise2 = plan.survey.noise2(passes * f64::from(body.samples));
         // Draws of a cut are new in each pass, and average as its number; the cache's stream goes on and averages faster.
         let error = self.options.cut_error.unwrap_or((CUT_SHARE * passes * noise2).clamp(FINEST, COARSEST) as f32);
         Tuning {
             error,
             floor: DARK * plan.survey.typical,
-            partition: plan.near.as_ref().map_or(Partition::NONE, |near| near.partition),
+            partition: body.near.as_ref().map_or(Partition::NONE, |near| near.rest),
         }
     }
 
@@ -213,18 +220,15 @@ impl Subsurface {
             };
             let exits: Vec<Exit> = group.iter().filter_map(exit).collect();
             let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
-            gatherer.gather((&body.model, &body.envelope), &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
-            let plan = self.plans.get().map(|plans| &plans[group[0].0]);
-            if let Some(Plan { survey, near: Some(near) }) = plan {
-                let filler = self.filler(view, group[0].0, body, &body.streams[0], &survey.density);
-                for ((exit, &key), sum) in exits.iter().zip(&keys).zip(&mut found) {
-                    *sum += near.estimate(
-                        &filler,
-                        exit,
-                        hash_combine(key, 0x6e65_6172),
-                        (&mut tally.rays, &mut tally.gather),
-                    );
-                }
+            let kernel = (&body.model, &body.envelope);
+            Clock::time(&mut tally.clock.gather, || {
+                gatherer.gather(kernel, &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
+            });
+            if let Some(near) = &body.near {
+                let even = Density::even();
+                let filler = self.filler(view, group[0].0, body, &body.streams[0], &even);
+                let streams: Vec<PixelStream> = group.iter().map(|&(_, i)| rays[i].stream).collect();
+                near.add(&filler, &exits, &streams, (&mut tally.rays, &mut tally.gather, &mut tally.clock), &mut found);
             }
             for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
                 inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));
@@ -252,14 +256,32 @@ impl Subsurface {
         inside + self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(body.medium.eta, n.dot(w))
     }
 
-    fn tree_part(&self, name: &str) -> Part {
+    fn tree_part(&self, name: &str, body: &Body) -> Part {
         let part = format!("sample tree of `{name}`");
         match self.options.estimator {
-            Estimator::Cut if self.options.cache_samples as usize > PLAIN_SUM => {
+            Estimator::Cut if body.samples as usize > PLAIN_SUM => {
                 Part::built(part, format!("each pass, where more than {PLAIN_SUM} samples carry light"))
             }
             Estimator::Cut => Part::left_out(part, format!("up to {PLAIN_SUM} samples the plain sum is faster")),
             other => Part::left_out(part, format!("the estimator `{}` sums over the samples", other.name())),
+        }
+    }
+
+    fn near_part(&self, name: &str, body: &Body) -> Part {
+        let part = format!("near field of `{name}`");
+        match (&body.near, self.options.estimator) {
+            (Some(near), _) => Part::built(
+                part,
+                format!(
+                    "light within {:.3} is sampled for each exit, {} samples serve for the rest",
+                    near.radius(),
+                    body.samples
+                ),
+            ),
+            (None, Estimator::Notes | Estimator::Thinned) => {
+                Part::left_out(part, "the lecture's law takes the cache alone")
+            }
+            (None, _) => Part::left_out(part, "light comes farther than from one cached sample to the next"),
         }
     }
 
@@ -284,25 +306,49 @@ impl Subsurface {
     }
 }
 
+/// The near field of a body of `area` [unit²], where its medium needs one, and how many samples its cache then has.
+fn near_field(envelope: &Envelope, area: f64, options: &SubsurfaceOptions) -> (Option<NearField>, u32) {
+    let most = options.cache_samples;
+    let split = matches!(options.estimator, Estimator::All | Estimator::Cut | Estimator::Cluster);
+    let apart2 = |samples: u32| area / f64::from(samples.max(1));
+    let noise = |samples, part| apart2(samples) * envelope.variance_per_area(part);
+    if !split || options.entry == EntrySampling::Cosine || noise(most, Partition::NONE) <= NOISY {
+        return (None, most);
+    }
+    let radius = |samples| NEAR_RADIUS * apart2(samples).sqrt() as f32;
+    let mut samples = FEWEST.min(most);
+    while samples < most && noise(samples, Partition::beyond(radius(samples))) > FAR_NOISE {
+        samples = samples.saturating_mul(2).min(most);
+    }
+    // Short lines meet fewer surfaces that do not matter.
+    let mut radius = radius(samples);
+    while noise(samples, Partition::beyond(0.7 * radius)) <= FAR_NOTHING {
+        radius *= 0.7;
+    }
+    (Some(NearField::new(envelope, radius)), samples)
+}
+
 impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
-        let plans = self.plans.get_or_init(|| self.plans(view));
+        let plans = Clock::time(&mut tally.clock.survey, || self.plans.get_or_init(|| self.plans(view)));
         let turn = Turn::of(self.options.seed, pass);
         let fill = |(object, body): (usize, &Option<Body>)| {
             let body = body.as_ref()?;
             let density = &plans[object].survey.density;
             let filler = self.filler(view, object, body, &body.streams[turn.stream], density);
-            let count = self.options.cache_samples;
-            let mut cache = filler.fill(u64::from(turn.number) * u64::from(count), count, &mut tally.rays);
+            let count = body.samples;
+            let first = u64::from(turn.number) * u64::from(count);
+            let mut cache = Clock::time(&mut tally.clock.fill, || filler.fill(first, count, &mut tally.rays));
             let all = cache.lit.len();
             cache.lit.retain(CachedSample::is_finite);
             tally.gather.non_finite += (all - cache.lit.len()) as u64;
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
-            let tuning = self.tuning(&plans[object], pass);
-            Some(Gatherer::new(self.options.estimator, cache, &body.model, tuning))
+            let tuning = self.tuning(body, &plans[object], pass);
+            let ready = || Gatherer::new(self.options.estimator, cache, &body.model, tuning);
+            Some(Clock::time(&mut tally.clock.tree, ready))
         };
         self.bodies.iter().enumerate().map(fill).collect()
     }
@@ -319,7 +365,7 @@ impl Integrator for Subsurface {
     }
 
     fn shares_tiles(&self) -> bool {
-        matches!(self.options.estimator, Estimator::Cut | Estimator::Cluster)
+        matches!(self.options.estimator, Estimator::All | Estimator::Cut | Estimator::Cluster)
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {
@@ -336,17 +382,18 @@ impl Integrator for Subsurface {
         for (object, body) in scene.objects.iter().zip(&self.bodies) {
             let Some(body) = body else { continue };
             let name = &object.name;
-            let bytes = self.options.cache_samples as usize * size_of::<crate::cache::CachedSample>();
+            let bytes = body.samples as usize * size_of::<crate::cache::CachedSample>();
             parts.push(Part::built(
                 format!("sample cache of `{name}`"),
                 format!(
                     "{} samples a pass ({:.1} MB), {} triangles",
-                    self.options.cache_samples,
+                    body.samples,
                     bytes as f64 / 1e6,
                     body.table.len()
                 ),
             ));
-            parts.push(self.tree_part(name));
+            parts.push(self.tree_part(name, body));
+            parts.push(self.near_part(name, body));
             parts.push(if body.medium.is_grey() {
                 Part::left_out(format!("colour of `{name}`"), "a grey medium: S_d is evaluated in one channel")
             } else {

@@ -1,6 +1,6 @@
 //! One JSON line per pass.
 
-use crate::cache::GatherTally;
+use crate::cache::{Clock, GatherTally};
 use crate::error::{Error, Result};
 use crate::film::{Counts, SelfErrors};
 use crate::integrator::WalkTally;
@@ -26,6 +26,8 @@ pub struct Record {
     pub seconds_gather: f64,
     /// Setup, cache and gathering; writing and measuring are not in it [s].
     pub seconds_total: f64,
+    /// The same in parts.
+    pub clock: Clock,
     /// Rays by kind.
     pub rays: RayTally,
     /// Cached samples and pairs of points.

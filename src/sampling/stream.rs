@@ -32,6 +32,14 @@ impl PixelStream {
         if first.is_multiple_of(4) { [a, b] } else { [c, d] }
     }
 
+    /// The next whole set of four dimensions, in [0, 1): stratified together.
+    #[inline]
+    pub fn next_4d(&mut self) -> [f32; 4] {
+        let first = self.dimension.next_multiple_of(4);
+        self.dimension = first + 4;
+        sobol_burley::sample_4d(self.index, 0, self.set_seed(first))
+    }
+
     /// The next dimension, in [0, 1).
     #[inline]
     pub fn next_1d(&mut self) -> f32 {
@@ -79,6 +87,13 @@ impl PixelStream {
         })
     }
 
+    /// The same sample's numbers for another purpose, scrambled on their own.
+    #[inline]
+    #[must_use]
+    pub fn aside(&self, purpose: u64) -> Self {
+        Self { key: hash_combine(self.key, purpose | 1 << 41), index: self.index, dimension: 0 }
+    }
+
     /// Goes on to dimensions that no earlier [`Self::split`] of this stream has used.
     #[inline]
     pub fn skip_split(&mut self) {
@@ -116,6 +131,20 @@ mod tests {
             assert_eq!(pair.next_2d(), [single.next_1d(), single.next_1d()]);
             assert_eq!(pair.dimension, single.dimension);
         }
+    }
+
+    #[test]
+    fn a_set_of_four_is_two_pairs_and_another_purpose_has_other_numbers() {
+        for start in [0, 3, 4] {
+            let mut four = PixelStream { dimension: start, ..PixelStream::new(5, 6, 7) };
+            let mut pairs = PixelStream { dimension: start.next_multiple_of(4), ..four };
+            let [a, b, c, d] = four.next_4d();
+            assert_eq!([[a, b], [c, d]], [pairs.next_2d(), pairs.next_2d()]);
+            assert_eq!(four.dimension, pairs.dimension);
+        }
+        let stream = PixelStream::new(5, 6, 7);
+        let numbers = [stream, stream.aside(1), stream.aside(2), stream.split(0, 1)].map(|mut s| s.next_2d());
+        assert!((1..4).all(|i| (0..i).all(|j| numbers[i] != numbers[j])), "{numbers:?}");
     }
 
     /// 256 samples of a pixel put one point into each of the 256 elementary boxes of a pair of dimensions.

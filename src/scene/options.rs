@@ -87,7 +87,7 @@ impl Estimator {
         match self {
             Self::Notes => 1024,
             Self::All => 4096,
-            Self::Thinned => 16384,
+            Self::Thinned => 2048,
             Self::Cut | Self::Cluster => 131_072,
         }
     }
