@@ -152,8 +152,14 @@ impl Trustworthiness {
                 best.model,
                 wrong("it")
             ),
-            Some(_) => format!("trust none, the body is too thin: even {}; take --method volume_path", wrong(&format!("`{}`", best.model))),
-            None => format!("trust none, whatever the thickness: even {}; take --method volume_path", wrong(&format!("`{}`", best.model))),
+            Some(_) => format!(
+                "trust none, the body is too thin: even {}; take --method volume_path",
+                wrong(&format!("`{}`", best.model))
+            ),
+            None => format!(
+                "trust none, whatever the thickness: even {}; take --method volume_path",
+                wrong(&format!("`{}`", best.model))
+            ),
         };
         format!(
             "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). Expected to \
