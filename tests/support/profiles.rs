@@ -82,7 +82,11 @@ pub fn against(totals: &Row, bins: &[&Row], paths: u64, seed: u64) -> Against {
     // As wide and deep as matters, and no wider: positions are single precision.
     let shape = match slab {
         true => Shape::Slab { thickness: thickness as f32, half_width: 200.0 },
-        false => Shape::Slab { thickness: 1000.0, half_width: 1000.0 },
+        // 15 diffusion lengths; rays that leave a surface start a few millionths of this away from it.
+        false => {
+            let size = (15.0 / (3.0 * a * (s * (1.0 - g) + a)).sqrt()).clamp(30.0, 1000.0) as f32;
+            Shape::Slab { thickness: size, half_width: size }
+        }
     };
     let body = Body::new(shape, medium);
     let ends: Vec<f64> = bins.iter().map(|b| b.number("r_hi")).collect();
