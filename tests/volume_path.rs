@@ -475,7 +475,14 @@ fn all_stored_spheres() {
         let beyond = z.iter().filter(|z| z.abs() > 5.2).count();
         println!("{preset}: {n} values, z {average:.3} +- {spread:.3}, {beyond} beyond 5.2");
         assert!(n > 10_000.0 && (beyond as f64) < 0.0025 * n, "{preset}: {beyond} of {n}");
-        assert!(average.abs() < 0.15 && spread < 1.15, "{preset}: z {average} +- {spread}");
+        // Where the stored picture is dark, few paths made both its mean and its error: too low a mean then comes with too
+        // low an error, and the average of z is above 0 while sums over regions agree.
+        assert!(average.abs() < 0.3 && spread < 1.25, "{preset}: z {average} +- {spread}");
+        let sum = |image: &Image, c: usize| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>();
+        for c in 0..3 {
+            let ratio = sum(&mean, c) / sum(&truth, c);
+            assert!((ratio - 1.0).abs() < 0.01, "{preset}, channel {c}: {ratio}");
+        }
     }
 }
 
