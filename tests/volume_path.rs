@@ -217,7 +217,7 @@ fn half_spaces_reflect_as_adding_doubling_says() {
 fn all_half_spaces() {
     let Some(folder) = std::env::var_os("MARMOR_REFERENCE_DIR") else { return };
     let text = std::fs::read_to_string(Path::new(&folder).join("adding_doubling.csv")).unwrap();
-    let (mut rows, mut beyond) = (0, 0);
+    let mut rows = 0;
     for line in text.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit())) {
         let v: Vec<f64> = line.split(',').take(8).map(|v| v.parse().unwrap()).collect();
         let expected = v[7] / (1.0 - v[5]);
@@ -232,11 +232,10 @@ fn all_half_spaces() {
             v[2],
             100.0 * error / mean
         );
-        assert!(error < 0.003 * expected && z.abs() < 4.0, "{line}");
-        (rows, beyond) = (rows + 1, beyond + i32::from(z.abs() > 3.0));
+        assert!(error < 0.003 * expected && z.abs() < 3.0, "{line}");
+        rows += 1;
     }
-    // 0.27 % of fair rows lie beyond 3 standard errors.
-    assert!(rows > 20 && beyond <= 1, "{beyond} of {rows} beyond 3 standard errors");
+    assert!(rows > 20, "{rows} rows");
 }
 
 /// Chi-square of a radial profile by order, and degrees of freedom; lengths in transport mean free paths.
@@ -278,10 +277,12 @@ fn radial_profiles(totals: &[Row], bins: &[Row], paths: u64) {
             continue;
         }
         let (chi, freedom) = radial(row, &mine, paths);
-        println!("{}: chi-square {chi:.1} of {freedom}", row.text("name"));
-        // Six standard deviations of the law of chi-square.
+        // The cube root of chi-square over its degrees of freedom is nearly normal [Wilson and Hilferty 1931]. 3 standard
+        // errors for some 40 rows together are 4 for each.
         let f = f64::from(freedom);
-        assert!(freedom >= 8 && chi < f + 6.0 * (2.0 * f).sqrt(), "{}: {chi} of {freedom}", row.text("name"));
+        let z = ((chi / f).cbrt() - (1.0 - 2.0 / (9.0 * f))) / (2.0 / (9.0 * f)).sqrt();
+        println!("{}: chi-square {chi:.1} of {freedom}, z {z:.2}", row.text("name"));
+        assert!(freedom >= 8 && z < 4.0, "{}: {chi} of {freedom}", row.text("name"));
     }
 }
 
@@ -426,6 +427,61 @@ fn single_scattering_of_subsurface_is_that_of_the_paths() {
             let mean = runs.iter().map(|r| r[c]).sum::<f64>() / 10.0;
             let variance = runs.iter().map(|r| (r[c] - mean).powi(2)).sum::<f64>() / 9.0;
             assert_same((mean, (variance / 10.0).sqrt()), expected, &format!("{name}, channel {c}: first order"));
+        }
+    }
+}
+
+/// The ball of the stored pictures: `preset`, eta and all, seen by the light that went through it alone.
+fn stored_ball(preset: &str) -> Scene {
+    load(&format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 10, 70]\nlook_at = [0, 0, 0]\nfov = 20\nresolution = [128, 128]\n\
+         [[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 10\nrings = 256\nsegments = 512\n\
+         material = \"m\"\n[material.m]\ntype = \"translucent\"\npreset = \"{preset}\"\n[[object]]\nname = \"lamp\"\n\
+         shape = \"rectangle\"\ncentre = [0, 160, -120]\nedge_u = [50, 0, 0]\nedge_v = [0, 30, 40]\nmaterial = \"lamp\"\n\
+         [material.lamp]\ntype = \"emissive\"\nradiance = 10\n"
+    ))
+}
+
+/// Pixel by pixel against pictures that another program traced, in `MARMOR_REFERENCE_DIR`: 99.75 % of the pixels within
+/// the bound that one of all pixels and channels of a fair picture would leave with a chance of 0.27 %.
+#[test]
+fn all_stored_spheres() {
+    let Some(folder) = std::env::var_os("MARMOR_REFERENCE_DIR") else { return };
+    for preset in ["skimmilk", "marble"] {
+        let path = Path::new(&folder).join(format!("images/gt_sphere_{preset}_128_layers.exr"));
+        let [truth, its] = ["sub", "sub_err"].map(|layer| Image::read_exr_layer(&path, Some(layer)).unwrap());
+        let scene = stored_ball(preset);
+        let rays = rays(&scene);
+        let options = VolumePathOptions { photons: 16384, specular: false, seed: 5, ..PLAIN };
+        let method = VolumePath::new(&scene, options).unwrap();
+        let mut film = Film::new([128, 128], Window::full([128, 128])).unwrap();
+        let cancel = AtomicBool::new(false);
+        let job = Job { seed: 5, passes: Some(128), time: None, cancel: &cancel };
+        render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+        let (mean, variance) = (film.image(), marmor::film::variance(&film).unwrap());
+        let mut z = Vec::new();
+        for i in 0..mean.pixels.len() {
+            for c in 0..3 {
+                let (error, own) = (f64::from(its.pixels[i][c]), f64::from(variance.pixels[i][c]));
+                if error > 0.0 && own > 0.0 {
+                    z.push(f64::from(mean.pixels[i][c] - truth.pixels[i][c]) / (error * error + own).sqrt());
+                }
+            }
+        }
+        let n = z.len() as f64;
+        let average = z.iter().sum::<f64>() / n;
+        let spread = (z.iter().map(|z| (z - average).powi(2)).sum::<f64>() / n).sqrt();
+        // For 10^4 to 10^5 tests: 5.2 to 5.6 standard errors.
+        let beyond = z.iter().filter(|z| z.abs() > 5.2).count();
+        println!("{preset}: {n} values, z {average:.3} +- {spread:.3}, {beyond} beyond 5.2");
+        assert!(n > 10_000.0 && (beyond as f64) < 0.0025 * n, "{preset}: {beyond} of {n}");
+        // Where the stored picture is dark, few paths made both its mean and its error: too low a mean then comes with too
+        // low an error, and the average of z is above 0 while sums over regions agree.
+        assert!(average.abs() < 0.3 && spread < 1.25, "{preset}: z {average} +- {spread}");
+        let sum = |image: &Image, c: usize| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>();
+        for c in 0..3 {
+            let ratio = sum(&mean, c) / sum(&truth, c);
+            assert!((ratio - 1.0).abs() < 0.01, "{preset}, channel {c}: {ratio}");
         }
     }
 }

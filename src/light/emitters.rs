@@ -1,6 +1,6 @@
 //! Triangle-mesh area lights, and the environment beside them.
 
-use super::{Arrival, Sky};
+use super::{Arrival, LampPoint, Sky};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray};
@@ -98,32 +98,42 @@ impl Lights {
         self.emitters.len()
     }
 
-    /// Light from a random point of the area lights, picked by power and area; `None` where it comes from behind
-    /// the surface or leaves the light at its dark side.
-    pub fn sample_emitter(&self, scene: &Scene, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
+    /// A random point of the area lights, picked by power and area; `None` without any.
+    pub fn point(&self, scene: &Scene, u: [f32; 3]) -> Option<LampPoint> {
         let pick = f64::from(u[0]);
         let chosen = self.cumulative.partition_point(|&c| c <= pick).min(self.emitters.len().checked_sub(1)?);
         let emitter = &self.emitters[chosen];
         let below = if chosen == 0 { 0.0 } else { self.cumulative[chosen - 1] };
         let within = (pick - below) / (self.cumulative[chosen] - below);
         let sample = emitter.table.sample(within, [u[1], u[2]]);
-        let light = scene.objects[emitter.object as usize].mesh.point(sample.triangle, sample.u, sample.v);
+        let at = scene.objects[emitter.object as usize].mesh.point(sample.triangle, sample.u, sample.v);
+        let Emitter { object, radiance, two_sided, pdf_area, .. } = *emitter;
+        Some(LampPoint { at, object, radiance, two_sided, pdf_area })
+    }
 
-        let to_light = light.x - at.x;
+    /// Chance per area [1/unit²] that [`Self::point`] picks a point of the object number `object`; 0 if it is no light.
+    pub fn pdf_area(&self, object: u32) -> f32 {
+        self.emitters.iter().find(|e| e.object == object).map_or(0.0, |e| e.pdf_area)
+    }
+
+    /// Light from a random point of the area lights, picked by power and area; `None` where it comes from behind
+    /// the surface or leaves the light at its dark side.
+    pub fn sample_emitter(&self, scene: &Scene, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
+        let lamp = self.point(scene, u)?;
+        let to_light = lamp.at.x - at.x;
         let distance = to_light.length();
         if distance <= 0.0 {
             return None;
         }
         let w = to_light / distance;
-        let (cos, cos_light) = (at.n.dot(w), -light.n_geometric.dot(w));
-        let cos_light = if emitter.two_sided { cos_light.abs() } else { cos_light };
+        let (cos, cos_light) = (at.n.dot(w), lamp.cosine(w));
         if cos <= 0.0 || cos_light <= 0.0 || at.n_geometric.dot(w) <= 0.0 {
             return None;
         }
         // Divided one length at a time: distance² leaves the range of f32 long before the quotient does.
-        let solid_angle = cos_light / distance / distance / emitter.pdf_area;
-        let shadow = Ray::between(at.leave(w), light.leave(-w));
-        Some(Arrival { w, irradiance: emitter.radiance * (cos * solid_angle), pdf_angle: 1.0 / solid_angle, shadow })
+        let solid_angle = cos_light / distance / distance / lamp.pdf_area;
+        let shadow = Ray::between(at.leave(w), lamp.at.leave(-w));
+        Some(Arrival { w, irradiance: lamp.radiance * (cos * solid_angle), pdf_angle: 1.0 / solid_angle, shadow })
     }
 
     /// Light of the environment from one of the directions of [`Self::look_around`].

@@ -4,6 +4,7 @@
 mod emitters;
 mod sky;
 
+use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::scene::{Scene, Surface};
@@ -22,6 +23,30 @@ pub struct Arrival {
     pub pdf_angle: f32,
     /// Light arrives if nothing is hit on this ray.
     pub shadow: Ray,
+}
+
+/// A point of an area light.
+#[derive(Clone, Copy, Debug)]
+pub struct LampPoint {
+    /// The point.
+    pub at: SurfacePoint,
+    /// Index of the object.
+    pub object: u32,
+    /// What it sends into every direction that it shines to.
+    pub radiance: Rgb,
+    /// Whether it shines to both sides.
+    pub two_sided: bool,
+    /// Chance of the point per area [1/unit²].
+    pub pdf_area: f32,
+}
+
+impl LampPoint {
+    /// Cosine at the lamp for light that is seen along the unit vector `w`, from there to the lamp; not above 0 where it is dark.
+    #[inline]
+    pub fn cosine(&self, w: Vec3) -> f32 {
+        let cosine = -self.at.n_geometric.dot(w);
+        if self.two_sided { cosine.abs() } else { cosine }
+    }
 }
 
 /// Radiance that the surface at `hit` sends back along a ray with direction `towards` of its own, by emission.

@@ -1,8 +1,9 @@
 //! A translucent object from the inside: flights, collisions, the boundary, until light leaves.
 
-use super::aim::Aim;
 use super::draws::Draws;
+use super::facets::Bend;
 use super::spectrum::{Coefficients, Spectrum};
+use super::through::Through;
 use crate::geometry::{Clearance, SurfacePoint};
 use crate::integrator::{View, WalkTally};
 use crate::math::{Rgb, Vec3};
@@ -27,8 +28,8 @@ pub struct Body {
     pub least_extinction: f32,
     /// Whether the medium goes on beyond the object's box: sheets and meshes with holes.
     pub endless: bool,
-    /// Lamps to aim at.
-    pub aims: Vec<Aim>,
+    /// How lamps are asked for at collisions.
+    pub through: Option<Through>,
     /// Collisions between two looks at the weight.
     pub patience: u32,
 }
@@ -55,8 +56,26 @@ pub struct Exit {
     pub at: SurfacePoint,
     /// Refracted direction outside.
     pub w: Vec3,
-    /// Whether it came there straight from a collision.
-    pub straight: bool,
+    /// How it came there, if straight from a collision.
+    pub straight: Option<Straight>,
+}
+
+/// The straight flight from a collision out of a body.
+#[derive(Clone, Copy, Debug)]
+pub struct Straight {
+    /// Phase function at the collision [1/sr].
+    pub phase: f32,
+    /// Length inside [unit].
+    pub length: f32,
+    /// Cosines to the normal, inside and outside.
+    pub cosines: [f32; 2],
+}
+
+impl Straight {
+    /// The whole line, `far` [unit] of it outside.
+    pub fn bend(&self, far: f32) -> Bend {
+        Bend { lengths: [self.length, far].map(f64::from), cosines: self.cosines.map(f64::from) }
+    }
 }
 
 /// Surface events in a row after which a path goes on by chance, lest it circle for ever without absorption.
@@ -80,7 +99,7 @@ pub enum Flight {
 
 impl Body {
     /// The object number `object`, with a table of the surfaces in its box.
-    pub fn new(object: u32, medium: &Medium, clearance: Clearance, aims: Vec<Aim>) -> Self {
+    pub fn new(object: u32, medium: &Medium, clearance: Clearance, through: Option<Through>) -> Self {
         let coefficients = Coefficients::new(medium);
         let absorbed = 1.0 - coefficients.albedo.max();
         let extinctions = coefficients.sigma_t.0.into_iter().filter(|s| *s > 0.0);
@@ -94,7 +113,7 @@ impl Body {
             phase: HenyeyGreenstein { g: medium.g },
             clearance,
             endless: false,
-            aims,
+            through,
         }
     }
 
@@ -185,7 +204,9 @@ impl Body {
                         && let Some(out) = refract(-w, inwards, 1.0 / self.eta)
                     {
                         spectrum.leave(&self.medium);
-                        return Some(Exit { at, w: out, straight: edge.is_some() });
+                        let cosines = [mu, -out.dot(inwards)];
+                        let straight = edge.map(|phase| Straight { phase, length: t, cosines });
+                        return Some(Exit { at, w: out, straight });
                     }
                     w = reflect(-w, inwards);
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);

@@ -1,12 +1,12 @@
 //! A path from the camera through the whole scene.
 
 use super::VolumePath;
-use super::aim::{Aim, aimed_light};
-use super::body::{Body, Edge, Watch, survives};
+use super::body::{Body, Edge, Straight, Watch, survives};
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
 use super::spectrum::Spectrum;
+use super::through::{lamp_light, share_by_chance};
 use crate::geometry::SurfacePoint;
 use crate::integrator::{Tally, View, WalkTally};
 use crate::light::emitted;
@@ -36,8 +36,8 @@ pub struct CameraPath<'a> {
     pub order: u32,
     /// Whether a lamp that is met counts: not where one was asked for at the last surface.
     pub meets_lamps: bool,
-    /// Lamps that were aimed at from the collision before, and do not count either.
-    pub aimed: &'a [Aim],
+    /// The body that was just left, and how.
+    pub left: Option<(&'a Body, Option<Straight>)>,
     pub radiance: Rgb,
 }
 
@@ -76,11 +76,22 @@ impl<'a> CameraPath<'a> {
         self.tally.rays.bounce += 1;
         match self.view.rays.closest(ray) {
             None => self.add(self.spectrum.value_outside() * self.method.light.lights.environment(ray.direction)),
-            Some(hit) if self.aimed.iter().all(|aim| aim.object != hit.mesh) => {
-                self.add(self.spectrum.value_outside() * emitted(self.view.scene, &hit, ray.direction));
+            Some(hit) => {
+                let share = self.left.map_or(1.0, |(body, straight)| match straight {
+                    // Met by chance alone, and seldom: white specks.
+                    None if body.through.as_ref().is_some_and(|t| t.alone(hit.mesh)) => 0.0,
+                    None => 1.0,
+                    Some(_) => self.share(&hit, ray.direction),
+                });
+                self.add(self.spectrum.value_outside() * emitted(self.view.scene, &hit, ray.direction) * share);
             }
-            Some(_) => {}
         }
+    }
+
+    /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision before.
+    fn share(&self, hit: &Hit, direction: Vec3) -> f32 {
+        let Some((body, Some(straight))) = &self.left else { return 1.0 };
+        share_by_chance(self.view.scene, &self.method.light.lights, body, straight, hit, direction)
     }
 
     /// Goes on from a surface that the camera sees.
@@ -93,16 +104,20 @@ impl<'a> CameraPath<'a> {
     /// What a surface adds, and the ray on which the path goes on.
     fn meet(&mut self, hit: &Hit, direction: Vec3) -> Option<Ray> {
         let at = self.view.point(hit, direction);
-        let aimed = std::mem::take(&mut self.aimed);
         match self.view.scene.surface(hit.mesh) {
             Surface::Emissive { .. } => {
-                if self.meets_lamps && aimed.iter().all(|aim| aim.object != hit.mesh) {
-                    self.add(self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * self.direct);
+                if self.meets_lamps {
+                    let share = self.direct * self.share(hit, direction);
+                    self.add(self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * share);
                 }
                 None
             }
-            Surface::Diffuse { albedo } => self.diffuse(&at, *albedo),
+            Surface::Diffuse { albedo } => {
+                self.left = None;
+                self.diffuse(&at, *albedo)
+            }
             Surface::Translucent(_) => {
+                self.left = None;
                 self.direct = self.other;
                 let body = self.method.bodies[hit.mesh as usize].as_ref()?;
                 if !self.faces(hit, direction) || self.other <= 0.0 {
@@ -163,7 +178,7 @@ impl<'a> CameraPath<'a> {
         self.tally.walk += walks;
         let exit = exit?;
         self.meets_lamps = true;
-        self.aimed = if exit.straight { &body.aims } else { &[] };
+        self.left = Some((body, exit.straight));
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
 }
@@ -200,9 +215,13 @@ impl Watch for Gather<'_, '_> {
             return path.other > 0.0;
         }
         let orders = path.method.options.orders;
-        if !body.aims.is_empty() && orders.contains(path.order) {
-            let light = aimed_light(path.view, body, x, w, spectrum, &mut path.coins, &mut path.tally.walk);
-            path.radiance += light * path.direct;
+        if body.through.is_some() && orders.contains(path.order) {
+            let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut path.tally.walk);
+            let lamps = (body, &path.method.light.lights);
+            path.radiance += lamp_light(path.view, lamps, (x, w), spectrum, found, coins, tally) * path.direct;
+            if path.method.points_are_all(body) {
+                return false;
+            }
         }
         if let (Some((source, cells)), true) = (photons, orders.contains(path.order + 1)) {
             let (coins, tally) = (&mut path.coins, &mut path.tally.walk);

@@ -3,6 +3,7 @@
 use super::body::Body;
 use super::cells::Cells;
 use super::draws::Draws;
+use super::facets::Crossing;
 use crate::integrator::{View, WalkTally};
 use crate::math::{Rgb, Vec3};
 use crate::query::Ray;
@@ -15,6 +16,7 @@ const MOST_LOOKED_AT: u32 = 1024;
 pub struct Scratch {
     rows: Vec<(u32, u32)>,
     found: Vec<(Vec3, Rgb)>,
+    pub crossings: Vec<Crossing>,
 }
 
 /// The share of light over a straight flight of `length` from a collision whose phase function into that direction is
@@ -49,7 +51,7 @@ pub fn connect(
     coins: &mut Draws,
     tally: &mut WalkTally,
 ) -> Rgb {
-    let Scratch { rows, found } = scratch;
+    let Scratch { rows, found, .. } = scratch;
     let near = cells.near(x, rows);
     if near == 0 {
         return Rgb::BLACK;

@@ -24,7 +24,12 @@ impl Draws {
 
     /// Numbers of another key, for work that must not disturb these.
     pub fn fork(&self, tag: u64) -> Self {
-        Self::new(&[], hash_combine(self.key, tag))
+        self.fork_with(&[], tag)
+    }
+
+    /// The same, with up to four `spread` numbers first.
+    pub fn fork_with(&self, spread: &[f32], tag: u64) -> Self {
+        Self::new(spread, hash_combine(self.key, tag))
     }
 
     #[inline]

@@ -1,16 +1,17 @@
 //! Paths through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach.
 //! Read first: `camera.rs` (a path through the scene), `body.rs` (inside one object), then `connect.rs` (what makes it fast).
 
-mod aim;
 mod body;
 mod camera;
 mod cells;
 mod connect;
 mod draws;
+mod facets;
 mod nested;
 mod pencil;
 mod photons;
 mod spectrum;
+mod through;
 
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, Part, Tally, View, WalkTally};
@@ -29,6 +30,7 @@ use draws::Draws;
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
+use through::Through;
 
 /// Options of [`VolumePath`].
 #[derive(Clone, Copy, Debug)]
@@ -53,6 +55,8 @@ pub struct VolumePath {
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps on the body itself, once photons have that.
     persistence: f32,
+    /// Whether this is [`Self::once`].
+    once: bool,
 }
 
 /// Cubes along the longest side of the tables of distances.
@@ -74,7 +78,8 @@ impl VolumePath {
             )));
         }
         let lights = Lights::new(scene);
-        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(|i| body(scene, i, CLEARANCE_CELLS)).collect();
+        let bodies: Vec<Option<Body>> =
+            (0..scene.objects.len()).map(|i| body(scene, &lights, i, CLEARANCE_CELLS)).collect();
         let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
         let source = |body: &Option<Body>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && lights.has_emitters())?;
@@ -90,7 +95,7 @@ impl VolumePath {
             (false, true) => 0.5,
             (false, false) => 0.25,
         };
-        Ok(Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence })
+        Ok(Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence, once: false })
     }
 
     fn shade(
@@ -122,6 +127,7 @@ impl VolumePath {
         tally: &'a mut Tally,
     ) -> CameraPath<'a> {
         let ([a, b], [c, d]) = (stream.next_2d(), stream.next_2d());
+        let ([e, f], [g, h]) = (stream.next_2d(), stream.next_2d());
         let mut draws = Draws::new(&[a, b, c, d], stream.key());
         CameraPath {
             method: self,
@@ -129,14 +135,14 @@ impl VolumePath {
             photons,
             scratch,
             tally,
-            coins: draws.fork(0),
+            coins: draws.fork_with(&[e, f, g, h], 0),
             spectrum: Spectrum::new(Rgb::WHITE, draws.number()),
             draws,
             direct: 1.0,
             other: 1.0,
             order: 0,
             meets_lamps: true,
-            aimed: &[],
+            left: None,
             radiance: Rgb::BLACK,
         }
     }
@@ -146,16 +152,11 @@ impl VolumePath {
     pub(super) fn once(scene: &Scene, wanted: impl Fn(usize) -> bool, seed: u64) -> Self {
         let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
         let endless = |body: Body| Body { endless: true, ..body };
-        let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
+        let lights = Lights::new(scene);
+        let body = |i| if wanted(i) { body(scene, &lights, i, 1).map(endless) } else { None };
         let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
         let sources = bodies.iter().map(|_| None).collect();
-        Self {
-            options,
-            light: DirectLight { lights: Lights::new(scene), samples: 1 },
-            bodies,
-            sources,
-            persistence: 1.0,
-        }
+        Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence: 1.0, once: true }
     }
 
     /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
@@ -169,19 +170,27 @@ impl VolumePath {
         path.radiance
     }
 
+    /// Whether a path of [`Self::once`] can find no more light once lamps have been asked for.
+    fn points_are_all(&self, body: &Body) -> bool {
+        let lamps = || body.through.as_ref().is_some_and(|t| t.all_alone);
+        self.once && !self.light.lights.has_environment() && lamps()
+    }
+
     fn of_order_0(&self, light: Rgb) -> Rgb {
         if self.options.orders.contains(0) { light } else { Rgb::BLACK }
     }
 }
 
 /// The body of object number `index`, where it is translucent and has a size.
-fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
+fn body(scene: &Scene, lights: &Lights, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
     let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
     let (lo, hi) = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, lo, hi, cells);
-    Some(Body::new(index as u32, &t.medium, clearance, aim::aims(scene, index as u32)))
+    let scatters = t.medium.sigma_s.max() > 0.0;
+    let through = || Through::new(scene, lights, index as u32, t.medium.eta, t.medium.g as f32);
+    Some(Body::new(index as u32, &t.medium, clearance, scatters.then(through).flatten()))
 }
 
 impl Integrator for VolumePath {

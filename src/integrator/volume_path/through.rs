@@ -1,0 +1,314 @@
+//! Light from a lamp straight to a collision, through every facet of the boundary that refracts it there.
+
+use super::body::{Body, Straight};
+use super::draws::Draws;
+use super::facets::{Crossing, Facets};
+use super::spectrum::Spectrum;
+use crate::integrator::{View, WalkTally};
+use crate::light::{LampPoint, Lights};
+use crate::math::{Rgb, Vec3};
+use crate::optics::transmittance;
+use crate::query::{Hit, Ray};
+use crate::scene::Scene;
+use std::f32::consts::PI;
+
+/// What a body needs to be asked for the light of lamps.
+pub struct Through {
+    facets: Facets,
+    /// For each object whether it is a lamp whose light is found from points of it alone; a path that meets it by chance,
+    /// straight from a collision, carries none of it.
+    alone: Vec<bool>,
+    /// Whether that holds for all lamps.
+    pub all_alone: bool,
+}
+
+/// Crossings whose light may be looked for at one collision; of more, as many are drawn by what they carry.
+const MOST_TRACED: usize = 3;
+/// Every crossing within this many mean free paths is asked for; those beyond by chance.
+const SURE: f32 = 1.0;
+/// A lamp is [`Through::alone`] if no sample of its points is worth more than this share of its radiance.
+const ALONE_BELOW: f32 = 0.25;
+
+impl Through {
+    /// For the object number `object` with refractive index `eta` and mean cosine `g`. `None` without lamps or facets.
+    pub fn new(scene: &Scene, lights: &Lights, object: u32, eta: f32, g: f32) -> Option<Self> {
+        if !lights.has_emitters() {
+            return None;
+        }
+        let mesh = &scene.objects[object as usize].mesh;
+        let (lo, hi) = mesh.bounds()?;
+        // HG's largest value [1/sr].
+        let phase = (1.0 + g.abs()) / (4.0 * PI * (1.0 - g.abs()).powi(2));
+        let is_alone = |lamp: u32| {
+            let bounds = scene.objects[lamp as usize].mesh.bounds();
+            let gap = bounds.map_or(0.0, |b| (b.0 - hi).max(lo - b.1).max(Vec3::ZERO).length());
+            // The focus of a flat boundary seen from behind it is at most 1/(η L)² times the cosine's ratio.
+            phase / lights.pdf_area(lamp) < ALONE_BELOW * gap * gap * (eta * eta).min(1.0)
+        };
+        let is_lamp = |i: u32| lights.pdf_area(i) > 0.0;
+        let alone: Vec<bool> = (0..scene.objects.len() as u32).map(|i| is_lamp(i) && is_alone(i)).collect();
+        let all_alone = (0..alone.len() as u32).all(|i| alone[i as usize] || !is_lamp(i));
+        Some(Self { facets: Facets::new(mesh, eta)?, alone, all_alone })
+    }
+
+    /// Whether light of the object number `object` is left to [`lamp_light`] alone.
+    pub fn alone(&self, object: u32) -> bool {
+        self.alone[object as usize]
+    }
+}
+
+/// Densities of one line from a collision to a point of a lamp, per area of the lamp: by a point drawn on the lamp, and by a
+/// direction drawn from the phase function and let through. The balance heuristic [VG95] shares the light among both:
+/// no line carries more than the lamp's radiance.
+struct Densities {
+    by_point: f32,
+    by_chance: f32,
+}
+
+impl Densities {
+    fn share_by_point(&self) -> f32 {
+        self.by_point / (self.by_point + self.by_chance)
+    }
+}
+
+/// Radiance that lamps send straight to the collision at `x`, through the boundary, scattered there against `w`, in which
+/// the path from the camera came: an estimate with the path's weight in it.
+///
+/// A point of a lamp is drawn, and all facets that refract its light to `x` are found: the sum over them is what
+/// arrives from there [WZHB09], caustics and all. Facets far away for the light to come through are looked for by chance,
+/// with its inverse as weight. Light reflected inside on its way is not in it.
+pub fn lamp_light(
+    view: View<'_>,
+    (body, lights): (&Body, &Lights),
+    (x, w): (Vec3, Vec3),
+    spectrum: &Spectrum,
+    found: &mut Vec<Crossing>,
+    draws: &mut Draws,
+    tally: &mut WalkTally,
+) -> Rgb {
+    let Some(through) = &body.through else { return Rgb::BLACK };
+    let u = [draws.number(), draws.number(), draws.number()];
+    let decay = body.least_extinction;
+    let horizon = (SURE - (1.0 - draws.number()).ln()) / decay;
+    if body.clearance.at(x) > horizon {
+        return Rgb::BLACK;
+    }
+    let Some(lamp) = lights.point(view.scene, u) else { return Rgb::BLACK };
+    let mesh = &view.scene.objects[body.object as usize].mesh;
+    through.facets.crossings(mesh, x, lamp.at.x, horizon, found);
+    let alone = through.alone(lamp.object);
+    let mut sum = 0.0;
+    let carried = |crossing: &Crossing| {
+        let light = line(body, crossing, &lamp, body.phase(w, crossing.inside), alone);
+        let length = crossing.bend.lengths[0] as f32;
+        // Over the chance that the horizon is not nearer.
+        let weighted = decay * (length - SURE / decay).max(0.0);
+        lamp.radiance * body.medium.sigma_t.map(|s| (weighted - s * length).exp()) * light
+    };
+    found.retain(|crossing| {
+        let light = carried(crossing).mean();
+        sum += light;
+        light > 0.0
+    });
+    let mut light = Rgb::BLACK;
+    if found.len() <= MOST_TRACED {
+        for crossing in found.iter().filter(|c| open(view, body, x, c, &lamp, tally)) {
+            light += carried(crossing);
+        }
+    } else {
+        // Evenly spaced marks along the sum of what is carried.
+        let step = sum / MOST_TRACED as f32;
+        let (mut mark, mut below) = (draws.number() * step, 0.0);
+        for crossing in found.iter() {
+            let carried = carried(crossing);
+            below += carried.mean();
+            let mut marks = 0.0;
+            while mark < below {
+                (mark, marks) = (mark + step, marks + 1.0);
+            }
+            if marks > 0.0 && open(view, body, x, crossing, &lamp, tally) {
+                light += carried * (marks * step / carried.mean());
+            }
+        }
+    }
+    spectrum.value(&body.medium) * light
+}
+
+/// What arrives of the lamp's radiance over one line, over the density of the lamp's point; without absorption.
+fn line(body: &Body, crossing: &Crossing, lamp: &LampPoint, phase: f32, alone: bool) -> f32 {
+    let cosine = lamp.cosine(crossing.outside);
+    if cosine <= 0.0 {
+        return 0.0;
+    }
+    let passed = transmittance(1.0 / body.eta, crossing.bend.cosines[0] as f32);
+    let by_chance = phase * passed * cosine * crossing.bend.focus(body.eta.into()) as f32;
+    let densities = Densities { by_point: lamp.pdf_area, by_chance };
+    by_chance / lamp.pdf_area * if alone { 1.0 } else { densities.share_by_point() }
+}
+
+/// Whether nothing stands between `x` and the lamp.
+fn open(view: View<'_>, body: &Body, x: Vec3, crossing: &Crossing, lamp: &LampPoint, tally: &mut WalkTally) -> bool {
+    let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
+    tally.rays += 1;
+    if view.rays.occluded(&Ray::between(x, at.leave(-at.n_geometric))) {
+        return false;
+    }
+    tally.rays += 1;
+    let (from, to) = (at.leave(at.n_geometric), lamp.at.leave(-crossing.outside));
+    !view.rays.occluded(&Ray::between(from, to))
+}
+
+/// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
+/// a collision, that [`lamp_light`] leaves to it.
+pub fn share_by_chance(
+    scene: &Scene,
+    lights: &Lights,
+    body: &Body,
+    straight: &Straight,
+    hit: &Hit,
+    direction: Vec3,
+) -> f32 {
+    let Some(through) = &body.through else { return 1.0 };
+    if through.alone(hit.mesh) {
+        return 0.0;
+    }
+    let bend = straight.bend(hit.t);
+    let normal = scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
+    let focus = bend.focus(body.eta.into()) as f32 * normal.dot(direction).abs();
+    let passed = transmittance(1.0 / body.eta, bend.cosines[0] as f32);
+    let densities = Densities { by_point: lights.pdf_area(hit.mesh), by_chance: straight.phase * passed * focus };
+    densities.by_chance / (densities.by_point + densities.by_chance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::body::Flight;
+    use super::*;
+    use crate::integrator::{VolumePath, VolumePathOptions};
+    use crate::light::emitted;
+    use crate::optics::refract;
+    use crate::query::{self, Backend};
+    use crate::scene::{Orders, SceneFile};
+
+    const OPTIONS: VolumePathOptions = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed: 1 };
+
+    fn scene(medium: &str, lamp: &str) -> Scene {
+        let text = format!(
+            "unit = \"mm\"\n[camera]\nposition = [0, 0, 9]\nlook_at = [0, 0, 0]\nfov = 15\nresolution = [8, 8]\n\
+             [[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nrings = 12\nsegments = 24\n\
+             material = \"body\"\n[material.body]\ntype = \"translucent\"\n{medium}\n\
+             [[object]]\nname = \"post\"\nshape = \"sphere\"\ncentre = [0.5, 1.6, 0]\nradius = 0.4\nrings = 12\nsegments = 24\n\
+             material = \"grey\"\n[material.grey]\ntype = \"diffuse\"\nalbedo = 0.5\n\
+             [material.lamp]\ntype = \"emissive\"\nradiance = [3, 2, 1]\n{lamp}"
+        );
+        Scene::load(&SceneFile::parse(&text, std::path::Path::new("test.toml")).unwrap()).unwrap()
+    }
+
+    /// A mean and its standard error.
+    #[derive(Default)]
+    struct Mean([f64; 3]);
+
+    impl Mean {
+        fn add(&mut self, value: f32) {
+            let v = f64::from(value);
+            self.0 = [self.0[0] + 1.0, self.0[1] + v, self.0[2] + v * v];
+        }
+
+        fn get(&self) -> (f64, f64) {
+            let [n, sum, squares] = self.0;
+            (sum / n, ((squares / n - (sum / n).powi(2)) / n).sqrt())
+        }
+    }
+
+    /// Points of lamps and chance together against directions of the phase function alone, straight flights, in channel 0.
+    fn both_ways(medium: &str, lamp: &str, samples: u64) -> [(f64, f64); 2] {
+        let scene = scene(medium, lamp);
+        let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
+        let view = View { scene: &scene, rays: &*rays };
+        let method = VolumePath::new(&scene, OPTIONS).unwrap();
+        let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
+        let (mut points, mut chance) = (Mean::default(), Mean::default());
+        let (mut found, mut tally) = (Vec::new(), WalkTally::default());
+        for i in 0..samples {
+            let mut draws = Draws::new(&[], i);
+            // Somewhere in the ball, more often close to its surface.
+            let x = draws.direction() * (0.95 * (1.0 - draws.number().powi(2))) - scene.centre.as_vec3();
+            let w = draws.direction();
+            let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
+            let mut lucky = [0.0; 2];
+            let to = body.scatter(w, &mut draws);
+            if let Flight::Boundary(at, length) = body.flight(view, x, to, f32::INFINITY, &mut tally)
+                && let Some(out) = refract(-to, -at.n_geometric, 1.0 / body.eta)
+                && let Some(hit) = view.rays.closest(&Ray::new(at.leave(out), out))
+            {
+                let mu = to.dot(at.n_geometric);
+                let passed = transmittance(1.0 / body.eta, mu) * (-body.medium.sigma_t[0] * length).exp();
+                let phase = body.phase(w, to);
+                let straight = Straight { phase, length, cosines: [mu, out.dot(at.n_geometric)] };
+                let light = emitted(&scene, &hit, out)[0] * passed;
+                lucky = [light, light * share_by_chance(&scene, lights, body, &straight, &hit, out)];
+            }
+            chance.add(lucky[0]);
+            // Far less noisy, but slower.
+            if i % 12 == 0 {
+                let light = lamp_light(view, (body, lights), (x, w), &spectrum, &mut found, &mut draws, &mut tally);
+                points.add(light[0] + lucky[1]);
+            }
+        }
+        [points.get(), chance.get()]
+    }
+
+    const SMALL: &str = "[[object]]\nshape = \"rectangle\"\ncentre = [0, 8, 2]\nedge_u = [1.2, 0, 0]\n\
+                         edge_v = [0, 0.9, -1.2]\nmaterial = \"lamp\"\n[[object]]\nshape = \"sphere\"\n\
+                         centre = [7, -2, 3]\nradius = 0.7\nmaterial = \"lamp\"\n";
+    /// Beside the ball, and larger than it.
+    const LARGE: &str = "[[object]]\nshape = \"rectangle\"\ncentre = [0, -1.3, 0]\nedge_u = [0, 0, 3]\n\
+                         edge_v = [3, 0, 0]\nmaterial = \"lamp\"\n";
+
+    /// To 6 standard errors, in one scene a line: refraction to either side and none, forward and backward scattering,
+    /// small and large lamps, something in the way.
+    #[test]
+    fn points_of_lamps_find_what_chance_finds() {
+        for (medium, lamp) in [
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0\neta = 1.3", SMALL),
+            ("sigma_s = 9\nsigma_a = 0.2\ng = 0\neta = 1.5", SMALL),
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0.6\neta = 1", SMALL),
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = -0.5\neta = 0.75", SMALL),
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0\neta = 1.3", LARGE),
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0.9\neta = 1.5", LARGE),
+        ] {
+            let [points, chance] = both_ways(medium, lamp, 1_200_000);
+            println!("{medium}: {points:?} {chance:?} ratio of errors {}", chance.1 / points.1);
+            let error = points.1.hypot(chance.1);
+            assert!(error < 0.1 * chance.0, "{medium}: too noisy to say anything: {points:?} {chance:?}");
+            assert!((points.0 - chance.0).abs() < 6.0 * error, "{medium}: {points:?} {chance:?}");
+        }
+    }
+
+    /// No line carries more than the lamp's radiance.
+    #[test]
+    fn light_is_bounded() {
+        for (medium, lamp) in [
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0\neta = 1.3", LARGE),
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0.95\neta = 1.5", LARGE),
+            ("sigma_s = 1.5\nsigma_a = 0.2\ng = 0\neta = 0.75", SMALL),
+        ] {
+            let scene = scene(medium, lamp);
+            let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
+            let view = View { scene: &scene, rays: &*rays };
+            let method = VolumePath::new(&scene, OPTIONS).unwrap();
+            let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
+            let (mut found, mut tally, mut most) = (Vec::new(), WalkTally::default(), 0.0_f32);
+            for i in 0..100_000 {
+                let mut draws = Draws::new(&[], i);
+                let x = draws.direction() * 0.98 - scene.centre.as_vec3();
+                let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
+                let w = draws.direction();
+                let light = lamp_light(view, (body, lights), (x, w), &spectrum, &mut found, &mut draws, &mut tally);
+                most = most.max(light.max() / found.len().max(1) as f32);
+            }
+            println!("{medium}: {most}");
+            assert!(most > 0.0 && most < 3.0, "{medium}: {most}");
+        }
+    }
+}
