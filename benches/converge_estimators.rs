@@ -125,13 +125,13 @@ impl Bench<'_> {
     }
 }
 
-/// Pixels whose centre and all centres around hit a translucent object.
+/// Pixels whose centre and all centres around hit an object that is no lamp.
 fn interior(view: View<'_>) -> Vec<bool> {
     let [width, height] = view.scene.camera.resolution.map(i64::from);
     let on = |x: i64, y: i64| {
         let ray = view.scene.camera.ray([x, y].map(|v| v as u32), [0.5; 2]);
         let hit = view.rays.closest(&ray);
-        hit.is_some_and(|h| matches!(view.scene.surface(h.mesh), Surface::Translucent(_)))
+        hit.is_some_and(|h| !matches!(view.scene.surface(h.mesh), Surface::Emissive { .. }))
     };
     let hit: Vec<bool> = (0..width * height).map(|i| on(i % width, i / width)).collect();
     let at = |x: i64, y: i64| hit[(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize];

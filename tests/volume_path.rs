@@ -241,7 +241,11 @@ fn all_half_spaces() {
 /// Chi-square of a radial profile by order, and degrees of freedom; lengths in transport mean free paths.
 fn radial(totals: &Row, bins: &[&Row], paths: u64) -> (f64, u32) {
     let medium = ["mus", "mua", "g", "eta"].map(|k| totals.number(k));
-    let beam = Beam::new(medium, 1000.0, 1000.0);
+    // 15 diffusion lengths: a ray leaves a surface some 4e-6 of the box away from it, which must be nothing beside the finest
+    // rings.
+    let [s, a, g, _] = medium;
+    let size = (15.0 / (3.0 * a * (s * (1.0 - g) + a)).sqrt()).clamp(30.0, 1000.0);
+    let beam = Beam::new(medium, size, size);
     let mut sums = vec![[Sum::default(); 2]; bins.len()];
     beam.run(paths, 3, |left| {
         let r = f64::from(left.x.truncate().length());
