@@ -172,7 +172,10 @@ fn a_model_without_the_first_order_is_told() {
     for model in ["better", "beam"] {
         assert!(told(model, "method.single=false").contains("leaves out light scattered once"), "{model}");
         let added = told(model, "method.single=true");
-        assert!(added.contains("single scattering: exact") && !added.contains("leaves out"), "{model}: {added}");
+        assert!(
+            added.contains("single scattering: straight from lamps") && !added.contains("leaves out"),
+            "{model}: {added}"
+        );
     }
     for model in ["standard", "directional"] {
         assert!(!told(model, "method.single=false").contains("scattered once"), "{model}");

@@ -281,7 +281,7 @@ fn radial_profiles(totals: &[Row], bins: &[Row], paths: u64) {
             continue;
         }
         let (chi, freedom) = radial(row, &mine, paths);
-        // The cube root of chi-square over its degrees of freedom is nearly normal [Wilson and Hilferty 1931]. 3 standard
+        // The cube root of chi-square over its degrees of freedom is nearly normal [WH31]. 3 standard
         // errors for some 40 rows together are 4 for each.
         let f = f64::from(freedom);
         let z = ((chi / f).cbrt() - (1.0 - 2.0 / (9.0 * f))) / (2.0 / (9.0 * f)).sqrt();

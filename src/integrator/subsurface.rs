@@ -403,7 +403,7 @@ impl Integrator for Subsurface {
         parts.push(match (&self.single, self.options.single) {
             (Some(_), _) => Part::built(
                 "single scattering",
-                "straight from lamps; for the models that begin with light scattered twice",
+                "straight from lamps, but for what small lamps send by a reflection inside; the models begin with light scattered twice",
             ),
             (None, true) => Part::left_out("single scattering", "the models have it"),
             (None, false) => Part::left_out("single scattering", "switched off"),

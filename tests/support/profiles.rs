@@ -41,7 +41,7 @@ pub struct Against {
 }
 
 impl Against {
-    /// Chance of a larger chi-square [Wilson-Hilferty].
+    /// Chance of a larger chi-square [WH31].
     pub fn p(&self) -> f64 {
         let f = f64::from(self.freedom);
         let k = 2.0 / (9.0 * f);
