@@ -162,8 +162,8 @@ impl Trustworthiness {
             ),
         };
         format!(
-            "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). Expected to \
-             be wrong by, mean over the area: {}{behind}. So {verdict}",
+            "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). \
+             Expected error of how the light of a point spreads, mean over the area (smooth light evens some of it out): {}{behind}. So {verdict}",
             self.object,
             self.material,
             listed.join(", ")
