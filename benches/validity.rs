@@ -9,7 +9,7 @@ mod pencils;
 use marmor::bssrdf::{Bssrdf, DirectionalDipole, Entry, Exit, Model, ModelName, ModelVisitor};
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::{FresnelMoments, Medium};
-use pencils::{Body, Shape};
+use pencils::{Body, Shape, Sum};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -30,29 +30,6 @@ const ALBEDOS: [f64; 9] = [0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 0.99, 0.999];
 const TRACED: f64 = 0.9993;
 /// Thicknesses of slabs and radii of balls [transport mean free paths].
 const SIZES: [f32; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
-
-#[derive(Clone, Copy, Default)]
-struct Sum {
-    n: f64,
-    squares: f64,
-}
-
-impl Sum {
-    fn add(&mut self, w: f64) {
-        self.n += w;
-        self.squares += w * w;
-    }
-    fn join(mut self, other: Self) -> Self {
-        self.n += other.n;
-        self.squares += other.squares;
-        self
-    }
-    /// Mean over `paths` and its variance.
-    fn mean(&self, paths: f64) -> (f64, f64) {
-        let mean = self.n / paths;
-        (mean, (self.squares / paths - mean * mean).max(0.0) / paths)
-    }
-}
 
 /// Light by face (near, far), ring and order (0, 1, 2 and more).
 type Truth = [[[Sum; 3]; RINGS]; 2];
@@ -75,7 +52,7 @@ fn trace(shape: Shape, medium: Medium, factors: &[f64], paths: u64, seed: u64) -
     };
     let join = |mut a: Vec<Truth>, b: Vec<Truth>| {
         for (a, b) in a.iter_mut().flatten().flatten().flatten().zip(b.iter().flatten().flatten().flatten()) {
-            *a = a.join(*b);
+            a.join(b);
         }
         a
     };
@@ -182,7 +159,7 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
     };
     let places = || (0..2).flat_map(|face| (0..RINGS).map(move |i| (face, i))).filter(|&(face, i)| far(face, i));
     let far_truth = places().flat_map(|(face, i)| truth[face][i]).map(|s| s.mean(paths));
-    let (far_flux, far_variance) = far_truth.fold((0.0, 0.0), |(f, v), (flux, variance)| (f + flux, v + variance));
+    let (far_flux, far_variance) = far_truth.fold((0.0, 0.0), |(f, v), (flux, error)| (f + flux, v + error * error));
     // Of too little light nothing is said.
     let far_known = far_variance.sqrt() < 0.1 * far_flux;
     for model in models(shape, medium) {
@@ -199,7 +176,7 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
             let difference = flux - more.0 - if first { one.0 } else { 0.0 };
             wrong += difference.abs();
             total += difference;
-            variance += more.1 + if first { one.1 } else { 0.0 };
+            variance += more.1.powi(2) + if first { one.1.powi(2) } else { 0.0 };
         }
         row += &format!(",{:.3},{:.3}", total / all, wrong / all);
         largest = largest.max(variance.sqrt() / all);

@@ -3,11 +3,13 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
+mod command;
+
 use exr::prelude::*;
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 /// A ball of radius 2 at (10, 0, 0), its transport mean free path 0.5: radius 4, thickness 8 of them. A floor below.
 fn scene(model: &str) -> String {
@@ -52,17 +54,15 @@ cache_samples = 200
 }
 
 fn folder(model: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("scene.toml"), scene(model)).unwrap();
-    folder
+    command::folder(&scene(model))
 }
 
 fn marmor(folder: &Path, arguments: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_marmor")).current_dir(folder).args(arguments.split(' ')).output().unwrap()
+    command::marmor(folder, &arguments.split(' ').collect::<Vec<_>>())
 }
 
 fn told(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned() + &String::from_utf8_lossy(&output.stdout)
+    command::text(&output.stderr) + &command::text(&output.stdout)
 }
 
 /// All channels of a file by name, as the exr crate reads them.

@@ -26,6 +26,33 @@ pub struct Body {
     scene: Scene,
 }
 
+/// Sum and sum of squares of weights.
+#[derive(Clone, Copy, Default)]
+pub struct Sum {
+    n: f64,
+    squares: f64,
+}
+
+impl Sum {
+    /// One path's weight.
+    pub fn add(&mut self, w: f64) {
+        self.n += w;
+        self.squares += w * w;
+    }
+
+    /// The paths of both.
+    pub fn join(&mut self, other: &Self) {
+        self.n += other.n;
+        self.squares += other.squares;
+    }
+
+    /// Mean over `paths` and its standard error.
+    pub fn mean(&self, paths: f64) -> (f64, f64) {
+        let mean = self.n / paths;
+        (mean, ((self.squares / paths - mean * mean).max(0.0) / paths).sqrt())
+    }
+}
+
 /// Light that came out.
 #[derive(Clone, Copy, Debug)]
 pub struct Out {

@@ -1,36 +1,11 @@
 //! What leaves a half space or a slab, ring by ring, against the tables of another Monte Carlo program.
 #![allow(dead_code)] // each test and bench uses its part
 
-use crate::pencils::{Body, Shape};
+use crate::pencils::{Body, Shape, Sum};
 use crate::support::Row;
 use marmor::math::Rgb;
 use marmor::optics::Medium;
 use rayon::prelude::*;
-
-/// Sum and sum of squares of weights.
-#[derive(Clone, Copy, Default)]
-pub struct Sum {
-    n: f64,
-    squares: f64,
-}
-
-impl Sum {
-    fn add(&mut self, w: f64) {
-        self.n += w;
-        self.squares += w * w;
-    }
-
-    fn join(&mut self, other: &Self) {
-        self.n += other.n;
-        self.squares += other.squares;
-    }
-
-    /// Mean over `paths` and its standard error.
-    pub fn mean(&self, paths: f64) -> (f64, f64) {
-        let mean = self.n / paths;
-        (mean, ((self.squares / paths - mean * mean).max(0.0) / paths).sqrt())
-    }
-}
 
 /// A run against its table.
 pub struct Against {
