@@ -280,6 +280,16 @@ mod tests {
         }
     }
 
+    /// A sheet of thickness 10 that bends with a radius of 20: a quarter of the way to the ball that has its thickness.
+    #[test]
+    fn a_bent_sheet_lies_between_the_sheet_and_the_ball() {
+        let (sheet, ball) = (row("1.3,0,slab,10,0.9,"), row("1.3,0,ball,5,0.9,"));
+        let error = expected_error(ModelName::Standard, false, &place(0.9, 10.0, 0.05));
+        let column = 2 * MODELS.iter().position(|m| *m == (ModelName::Standard, false)).unwrap();
+        let expected = 0.75 * sheet[column] + 0.25 * ball[column];
+        assert!((error.total - expected).abs() < 1e-9, "{error:?} {expected}");
+    }
+
     #[test]
     fn between_rows_the_error_has_no_steps() {
         for model in [ModelName::Standard, ModelName::Beam] {
