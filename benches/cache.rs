@@ -94,7 +94,7 @@ impl Bench<'_> {
             let ray = camera.ray(pixel, [0.5; 2]);
             let hit = self.rays.closest(&ray).filter(|h| h.mesh == 0)?;
             let p = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.direction);
-            Some(Exit { x: p.x, n: p.n_geometric, w: -ray.direction })
+            Some(Exit { x: (p.x - self.table.centre()).as_vec3(), n: p.n_geometric, w: -ray.direction })
         };
         let mut tiles = Vec::new();
         for y in (0..camera.resolution[1] / TILE).step_by(3) {

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{BenchmarkId, Criterion, Throughput};
 use marmor::geometry::Mesh;
-use marmor::math::Vec3;
+use marmor::math::{DVec3, Vec3};
 use marmor::query::{self, Backend, Ray, RayQuery};
 use marmor::sampling::cosine_hemisphere;
 use scenes::{Draws, bumpy_sphere};
@@ -140,8 +140,8 @@ fn kinds(mesh: &Mesh, query: &dyn RayQuery) -> Vec<Kind> {
     const SQUARE: u32 = 8;
     let (lower, upper) = mesh.bounds().unwrap();
     let (centre, size) = ((lower + upper) * 0.5, (upper - lower).max_element());
-    let eye = centre + Vec3::new(0.3, 0.4, 1.6) * size;
-    let forward = (centre - eye).normalize();
+    let eye = centre + DVec3::new(0.3, 0.4, 1.6) * size;
+    let forward = (centre - eye).normalize().as_vec3();
     let right = forward.cross(Vec3::Y).normalize();
     let up = right.cross(forward);
     // In squares of eight by eight pixels, as the renderer has them.
@@ -165,8 +165,8 @@ fn kinds(mesh: &Mesh, query: &dyn RayQuery) -> Vec<Kind> {
         };
         bounce.push(away());
         occlusion.extend([away(), away()]);
-        let lamp = centre + Vec3::new(draws.unit() - 0.5, 2.0, draws.unit() - 0.5) * size;
-        shadow.push(Ray::between(point.leave(lamp - point.x), lamp));
+        let lamp = centre + Vec3::new(draws.unit() - 0.5, 2.0, draws.unit() - 0.5).as_dvec3() * size;
+        shadow.push(Ray::between(point.leave((lamp - point.x).as_vec3()), lamp));
     }
     vec![
         Kind { name: "primary", rays: primary, any_hit: false },
@@ -191,8 +191,8 @@ fn read_triangles(text: &str) -> Mesh {
         let mut words = line.split_whitespace();
         match words.next() {
             Some("v") => {
-                let [x, y, z] = std::array::from_fn(|_| words.next().unwrap().parse::<f32>().unwrap());
-                mesh.positions.push(Vec3::new(x, y, z));
+                let [x, y, z] = std::array::from_fn(|_| words.next().unwrap().parse::<f64>().unwrap());
+                mesh.positions.push(DVec3::new(x, y, z));
             }
             Some("f") => {
                 let corner = |word: &str| {

@@ -5,7 +5,7 @@ use marmor::bssrdf::{Bssrdf, Exit, Model, ModelName, ModelVisitor};
 use marmor::cache::{CachedSample, Clock, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
 use marmor::geometry::AreaTable;
 use marmor::light::Lights;
-use marmor::math::{Rgb, Vec3};
+use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::optics::Medium;
 use marmor::query::{self, Backend, RayQuery, RayTally};
 use marmor::sampling::{CacheStream, PixelStream, Points};
@@ -142,22 +142,24 @@ impl Set {
     /// Where a ray from outside along -`direction` meets the ball, with a normal turned by up to `tilt`.
     fn exit(&self, direction: Vec3, tilt: f32) -> Exit {
         let from = direction.normalize();
-        let hit = self.rays.closest(&query::Ray::new(9.0 * from, -from)).unwrap();
+        let hit = self.rays.closest(&query::Ray::new(9.0 * from.as_dvec3(), -from)).unwrap();
         let at = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
         let n = (at.n_geometric + tilt * Vec3::new(0.3, -0.5, 0.8)).normalize();
-        Exit { x: at.x, n, w: at.n_geometric }
+        Exit { x: (at.x - self.table.centre()).as_vec3(), n, w: at.n_geometric }
     }
 
     /// Mean and standard error of the near field at each of `exits`: what their lines find together, and what caches have.
     fn near_field(&self, near: &NearField, exits: &[Exit], runs: u64) -> Vec<[[f64; 2]; 2]> {
         let (even, stream) = (Density::even(), CacheStream::new(Points::Independent, 1, 0));
         let filler = self.filler(&stream, &even, 0.0);
+        let places: Vec<DVec3> = exits.iter().map(|e| self.table.centre() + e.x.as_dvec3()).collect();
         let own = |run: u64| {
             let streams: Vec<PixelStream> =
                 (0..exits.len() as u64).map(|i| PixelStream::new(5, run * exits.len() as u64 + i, 3)).collect();
             let mut sums = vec![Rgb::BLACK; exits.len()];
             let (mut rays, mut gather) = (RayTally::default(), GatherTally::default());
-            near.add(&filler, exits, &streams, (&mut rays, &mut gather, &mut Clock::default()), &mut sums);
+            let tally = (&mut rays, &mut gather, &mut Clock::default());
+            near.add(&filler, (exits, &places), &streams, tally, &mut sums);
             assert!(gather.near <= gather.near_points * exits.len() as u64 && gather.non_finite == 0);
             sums
         };

@@ -256,9 +256,9 @@ fn obj_files_that_are_read() {
     assert!(obj(&[b"# caf\xe9\ng \xe9\n", TRIANGLE.as_bytes(), b"f 1 2 3"].concat()).is_ok());
     assert_eq!(obj(&[b"\xef\xbb\xbf", TRIANGLE.as_bytes(), b"f 1 2 3"].concat()).unwrap().positions[0], DVec3::ZERO);
     assert!(parse(&format!("\u{feff}{GOOD}")).is_ok());
-    // Digits beyond f32 survive to the recentring.
+    // Digits beyond f32 survive.
     let far = obj(b"v 1000000.001 0 0\nv 1000000.002 0 0\nv 1000000 1 0\nf 1 2 3").unwrap().recentred(DVec3::X * 1e6);
-    assert_eq!(far.positions[0].x, (1_000_000.001 - 1e6) as f32);
+    assert_eq!(far.positions[0].x, 1_000_000.001 - 1e6);
 }
 
 #[test]
@@ -387,7 +387,7 @@ const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\
 
 fn volume(scene: &Scene) -> f64 {
     let mesh = &scene.objects[0].mesh;
-    let corners = (0..mesh.triangles.len() as u32).map(|t| mesh.corners(t).map(|p| p.as_dvec3()));
+    let corners = (0..mesh.triangles.len() as u32).map(|t| mesh.corners(t));
     corners.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
 }
 
@@ -395,7 +395,7 @@ fn volume(scene: &Scene) -> f64 {
 fn transforms_place_and_keep_the_outside_outside() {
     let corner = |keys: &str, i: usize| {
         let scene = placed(TETRAHEDRON, keys);
-        scene.objects[0].mesh.positions.iter().map(|p| p.as_dvec3() + scene.centre).collect::<Vec<_>>()[i]
+        scene.objects[0].mesh.positions.iter().map(|p| *p + scene.centre).collect::<Vec<_>>()[i]
     };
     // Vertices come in the order of the faces: origin, y, x, z.
     assert_eq!(
@@ -454,7 +454,7 @@ fn smooth_normals_are_weighted_by_angle_and_weld_equal_positions() {
     let mesh = &scene.objects[0].mesh;
     let normals = mesh.normals.as_ref().unwrap();
     let (t, corner) = (1, 2);
-    assert_eq!(mesh.positions[mesh.triangles[t][corner] as usize].as_dvec3() + scene.centre, DVec3::ZERO);
+    assert_eq!(mesh.positions[mesh.triangles[t][corner] as usize] + scene.centre, DVec3::ZERO);
     let n = normals.vectors[normals.triangles[t][corner] as usize];
     assert!((n - Vec3::splat(-1.0).normalize()).length() < 1e-6, "{n}");
     assert!(placed(cube, "normals = \"geometric\"").objects[0].mesh.normals.is_none());
@@ -472,7 +472,7 @@ fn far_scenes_keep_their_digits_and_powers_of_two_scale_exactly() {
         let keys = format!("transform = {{ scale = {:?}, rotate = [10, 20, 30] }}\nnormals = \"smooth\"", 0.37 * s);
         let scaled = placed(TETRAHEDRON, &keys);
         let (a, b) = (&near.objects[0].mesh, &scaled.objects[0].mesh);
-        let exact: Vec<Vec3> = a.positions.iter().map(|p| *p * s as f32).collect();
+        let exact: Vec<DVec3> = a.positions.iter().map(|p| *p * s).collect();
         assert_eq!((&exact, &a.triangles), (&b.positions, &b.triangles), "2^{k}");
         assert_eq!(a.normals.as_ref().unwrap().vectors, b.normals.as_ref().unwrap().vectors, "2^{k}");
     }

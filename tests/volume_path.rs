@@ -6,7 +6,7 @@ mod support;
 
 use marmor::film::{Film, Image, Window};
 use marmor::integrator::{Left, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions, WalkTally};
-use marmor::math::{Rgb, Vec3, hash};
+use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::reflectance;
 use marmor::query::{self, Backend, RayQuery};
 use marmor::render::{self, Job};
@@ -127,8 +127,8 @@ impl Beam {
         let rays = rays(&self.scene);
         let view = View { scene: &self.scene, rays: &*rays };
         let method = VolumePath::new(&self.scene, PLAIN).unwrap();
-        let top = -self.scene.centre.as_vec3();
-        let start = Vec3::new(top.x, top.y, top.z - 1e-6 * top.z.abs());
+        let top = -self.scene.centre;
+        let start = DVec3::new(top.x, top.y, top.z - 1e-6 * top.z.abs());
         let mut tally = WalkTally::default();
         for i in 0..paths {
             let key = hash(seed << 32 | i);

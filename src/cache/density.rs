@@ -3,7 +3,7 @@
 
 use super::{CachedSample, Envelope, Filler};
 use crate::geometry::SurfacePoint;
-use crate::math::{Vec3, Vec4};
+use crate::math::{DVec3, Vec3, Vec4};
 use crate::query::RayQuery;
 use crate::scene::{Scene, Spread};
 
@@ -34,7 +34,7 @@ pub struct Density {
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     /// Where [unit].
-    pub x: Vec3,
+    pub x: DVec3,
     /// Mean squared distance between it and the surface points that it stands for [unit²].
     pub spread2: f32,
 }
@@ -102,6 +102,8 @@ impl Survey {
         let bins = (count / PASS_PER_PILOT / PILOTS_PER_BIN).clamp(8, BINS);
         let attempted = bins * PILOTS_PER_BIN;
         let pilots = filler.pilots(attempted);
+        let local = |s: &Seen| ((s.x - filler.table.centre()).as_vec3(), s.spread2);
+        let seen: Vec<(Vec3, f32)> = seen.iter().map(local).collect();
         let sums: Vec<Vec4> = seen.iter().map(|s| pilots.iter().map(|(_, p)| share(envelope, s, p)).sum()).collect();
         let mean = sums.iter().sum::<Vec4>() / sums.len().max(1) as f32;
         // As errors are measured: relative, but dark points count less.
@@ -143,10 +145,10 @@ impl Survey {
 
 /// What a sample gives to a visible point, up to a common factor.
 #[inline]
-fn share(envelope: &Envelope, seen: &Seen, sample: &CachedSample) -> Vec4 {
-    let r2 = sample.entry.x.distance_squared(seen.x) + seen.spread2;
+fn share(envelope: &Envelope, &(x, spread2): &(Vec3, f32), sample: &CachedSample) -> Vec4 {
+    let r2 = sample.entry.x.distance_squared(x) + spread2;
     let [r, g, b] = sample.flux.0;
-    envelope.widened(r2, WIDEST * seen.spread2.sqrt()) * Vec4::new(r, g, b, 0.0)
+    envelope.widened(r2, WIDEST * spread2.sqrt()) * Vec4::new(r, g, b, 0.0)
 }
 
 /// 1/v, or 0 where that is not finite.
@@ -170,7 +172,7 @@ pub fn seen(scene: &Scene, rays: &dyn RayQuery) -> Vec<Vec<Seen>> {
         let Some(hit) = rays.closest(&ray) else { continue };
         let at: SurfacePoint = scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
         let [right, down] = [through(x + 0.5, y), through(x, y + 0.5)].map(|r| 2.0 * (r.direction - ray.direction));
-        let distance2 = at.x.distance_squared(camera.origin);
+        let distance2 = at.x.distance_squared(camera.origin) as f32;
         let cos = at.n_geometric.dot(ray.direction).abs().max(0.05);
         let area = right.cross(down).length() * distance2 / cos;
         seen[hit.mesh as usize].push(Seen { x: at.x, spread2: area / std::f32::consts::TAU });

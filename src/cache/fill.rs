@@ -22,7 +22,7 @@ pub struct Filler<'a> {
     pub lights: &'a Lights,
     /// The translucent object.
     pub object: u32,
-    /// Its area table.
+    /// Its area table; cached points are relative to its centre.
     pub table: &'a AreaTable,
     /// Its BSSRDF, which says at what depth a sample stands.
     pub model: &'a Model,
@@ -178,7 +178,7 @@ impl Filler<'_> {
         let t12 = transmittance(self.eta, arrival.w.dot(at.n));
         let flux: Rgb = arrival.irradiance * (t12 * weight);
         (!flux.is_black()).then(|| CachedSample {
-            entry: Entry { x: at.x, n: at.n, w },
+            entry: Entry { x: (at.x - self.table.centre()).as_vec3(), n: at.n, w },
             depth: self.model.sample_depth(u),
             flux,
         })

@@ -4,7 +4,7 @@
 use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally};
 use crate::bssrdf::{Exit, Partition};
 use crate::geometry::SurfacePoint;
-use crate::math::{Frame, Rgb, Vec3};
+use crate::math::{DVec3, Frame, Rgb, Vec3};
 use crate::query::{Hit, Ray, RayTally};
 use crate::sampling::PixelStream;
 use std::f32::consts::TAU;
@@ -70,7 +70,7 @@ struct Candidate {
 
 /// An exit and its axes, the normal first.
 struct Middle {
-    x: Vec3,
+    x: DVec3,
     axes: [Vec3; 3],
 }
 
@@ -110,11 +110,12 @@ impl NearField {
 
     /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `exits` to `sums`; `streams`, one for each, have
     /// its numbers. All surfaces found along lines parallel to the normals and tangents of neighbouring exits count for
-    /// each of them, over the density of all their lines together.
+    /// each of them, over the density of all their lines together. `places` are the points of the exits in the scene: what is
+    /// found is kept relative to one of them, so that neither the size of the body nor that of the scene rounds distances.
     pub fn add(
         &self,
         filler: &Filler<'_>,
-        exits: &[Exit],
+        (exits, places): (&[Exit], &[DVec3]),
         streams: &[PixelStream],
         (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
         sums: &mut [Rgb],
@@ -122,12 +123,15 @@ impl NearField {
         let (start, before) = (Instant::now(), clock.rays);
         let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model));
         let mut picked = Vec::new();
-        for ((exits, streams), sums) in exits.chunks(GROUP).zip(streams.chunks(GROUP)).zip(sums.chunks_mut(GROUP)) {
-            let middle = |exit: &Exit| {
+        let groups = exits.chunks(GROUP).zip(places.chunks(GROUP)).zip(streams.chunks(GROUP));
+        for (((exits, places), streams), sums) in groups.zip(sums.chunks_mut(GROUP)) {
+            let middle = |(exit, place): (&Exit, &DVec3)| {
                 let frame = Frame::about(exit.n);
-                Middle { x: exit.x, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
+                Middle { x: *place, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
             };
-            let middles: Vec<Middle> = exits.iter().map(middle).collect();
+            let middles: Vec<Middle> = exits.iter().zip(places).map(middle).collect();
+            let local = |(exit, place): (&Exit, &DVec3)| Exit { x: (*place - places[0]).as_vec3(), ..*exit };
+            let exits: Vec<Exit> = exits.iter().zip(places).map(local).collect();
             let candidates = self.along(filler, self.lines(&middles, streams), (&mut *rays, &mut *clock));
             let found = self.lit(filler, &middles, candidates, (&mut *rays, &mut *gather, &mut *clock));
             gather.near_points += found.len() as u64;
@@ -168,9 +172,10 @@ impl NearField {
         let r2 = self.ring(u) * self.radius * self.radius;
         let (sin, cos) = (TAU * v).sin_cos();
         let (along, aside, other) = (axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]);
-        let middle = *x + (aside * cos + other * sin) * r2.sqrt();
+        let middle = (aside * cos + other * sin) * r2.sqrt();
         let half = (self.radius * self.radius - r2).max(0.0).sqrt();
-        let ray = Ray { origin: middle + along * half, direction: -along, t_min: 0.0, t_max: 2.0 * half };
+        let origin = *x + (middle + along * half).as_dvec3();
+        let ray = Ray { t_max: 2.0 * half, ..Ray::new(origin, -along) };
         (half > 0.0).then_some(Line { ray, numbers, last: None })
     }
 
@@ -218,7 +223,7 @@ impl NearField {
         candidates
     }
 
-    /// Those candidates that nothing hides, over the density of all lines.
+    /// Those candidates that nothing hides, over the density of all lines; relative to the first of `middles`.
     fn lit(
         &self,
         filler: &Filler<'_>,
@@ -248,6 +253,7 @@ impl NearField {
                 continue;
             }
             sample.flux *= 1.0 / density;
+            sample.entry.x = (at.x - middles[0].x).as_vec3();
             match found.last_mut().filter(|_| again && joined) {
                 _ if !sample.is_finite() => (gather.non_finite, last) = (gather.non_finite + 1, 0),
                 Some(same) => same.flux += sample.flux,
@@ -270,7 +276,7 @@ impl NearField {
         let scale = 1.0 / (self.radius * self.radius);
         let mut density = 0.0;
         for Middle { x, axes } in middles {
-            let apart = at.x - *x;
+            let apart = (at.x - *x).as_vec3();
             let r2 = apart.length_squared();
             if r2 * scale > 1.0 {
                 continue;

@@ -156,7 +156,7 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
 }
 
 /// Area [unit²] and edges of the bounding box [unit].
-fn measures(mesh: &Mesh) -> (f64, [f32; 3]) {
+fn measures(mesh: &Mesh) -> (f64, [f64; 3]) {
     let area = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
     let size = mesh.bounds().map_or([0.0; 3], |(lo, hi)| (hi - lo).to_array());
     (area, size)

@@ -1,6 +1,7 @@
 //! Points on a mesh with equal chance per area: random triangle by area, random point in it, pdf 1/A.
 
 use super::{Mesh, morton_code};
+use crate::math::DVec3;
 
 /// Cumulative areas of a mesh's triangles in Morton order, so that a low-discrepancy number picks points
 /// that are spread over the surface, not only over the file's order. 12 bytes a triangle.
@@ -9,6 +10,7 @@ pub struct AreaTable {
     triangles: Vec<u32>,
     /// Area of all entries up to and with this one [unit²].
     cumulative: Vec<f64>,
+    centre: DVec3,
 }
 
 /// A triangle and barycentric coordinates, as [`Mesh::point`] takes them.
@@ -17,9 +19,9 @@ pub struct AreaSample {
     /// Index into the mesh's triangles.
     pub triangle: u32,
     /// Weight of the second corner.
-    pub u: f32,
+    pub u: f64,
     /// Weight of the third corner.
-    pub v: f32,
+    pub v: f64,
 }
 
 impl AreaTable {
@@ -46,12 +48,17 @@ impl AreaTable {
                 total
             })
             .collect();
-        Some(Self { triangles, cumulative })
+        Some(Self { triangles, cumulative, centre: 0.5 * lo + 0.5 * hi })
     }
 
     /// Area of the mesh [unit²].
     pub fn area(&self) -> f64 {
         self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// Middle of the mesh's box [unit]: what is kept in f32 of its surface is relative to this.
+    pub fn centre(&self) -> DVec3 {
+        self.centre
     }
 
     /// Triangles with area.
@@ -77,14 +84,15 @@ impl AreaTable {
 /// Folds the unit square onto the barycentrics of a triangle with constant density and little distortion
 /// [Heitz 2019], so that well-spread points stay well spread.
 #[inline]
-fn square_to_triangle([s, t]: [f32; 2]) -> [f32; 2] {
+fn square_to_triangle(u: [f32; 2]) -> [f64; 2] {
+    let [s, t] = u.map(f64::from);
     if t > s { [0.5 * s, t - 0.5 * s] } else { [s - 0.5 * t, 0.5 * t] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Vec3, hash, unit_f32, unit_f64};
+    use crate::math::{hash, unit_f32, unit_f64};
 
     fn numbers(i: u64) -> (f64, [f32; 2]) {
         let draw = |d: u64| (hash(i * 3 + d + 1) >> 32) as u32;
@@ -101,12 +109,12 @@ mod tests {
     fn fan(n: u32) -> Mesh {
         let mut mesh = Mesh::default();
         for i in 0..n {
-            let x = i as f32 * 10.0;
+            let x = f64::from(i) * 10.0;
             let base = mesh.positions.len() as u32;
             mesh.positions.extend([
-                Vec3::new(x, 0.0, 0.0),
-                Vec3::new(x + 1.0, 0.0, 0.0),
-                Vec3::new(x, 2.0 * (i + 1) as f32, 0.0),
+                DVec3::new(x, 0.0, 0.0),
+                DVec3::new(x + 1.0, 0.0, 0.0),
+                DVec3::new(x, 2.0 * f64::from(i + 1), 0.0),
             ]);
             mesh.triangles.push([base, base + 1, base + 2]);
         }
@@ -120,7 +128,8 @@ mod tests {
         assert!((table.area() - 210.0).abs() < 1e-9);
         assert_eq!(table.triangles.len(), 20);
         assert!(
-            AreaTable::new(&Mesh { triangles: vec![[0, 0, 0]], positions: vec![Vec3::ZERO], normals: None }).is_none()
+            AreaTable::new(&Mesh { triangles: vec![[0, 0, 0]], positions: vec![DVec3::ZERO], ..Mesh::default() })
+                .is_none()
         );
     }
 

@@ -1,12 +1,14 @@
 //! How far away the nearest surface is at least, from a table: a step shorter than that needs no ray.
 
 use super::Mesh;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// Lower bounds of the distance to a set of triangles, for the points of a box cut into cubes. One byte a cube.
 pub struct Clearance {
-    lo: Vec3,
-    hi: Vec3,
+    /// Smallest corner of the box [unit].
+    lo: DVec3,
+    /// From there to the largest one.
+    extent: Vec3,
     /// Edge of a cube [unit].
     edge: f32,
     size: [usize; 3],
@@ -19,14 +21,15 @@ const FARTHEST: f32 = 63.0;
 
 impl Clearance {
     /// For the box `lo`..`hi` [unit], its longest side cut into `cells`, and all triangles of `meshes`.
-    pub fn new<'a>(meshes: impl IntoIterator<Item = &'a Mesh>, lo: Vec3, hi: Vec3, cells: u32) -> Self {
+    pub fn new<'a>(meshes: impl IntoIterator<Item = &'a Mesh>, lo: DVec3, hi: DVec3, cells: u32) -> Self {
         let side = (hi - lo).max_element();
         // A little larger than the box, so that rounding puts no point of it outside.
-        let margin = Vec3::splat(1e-4 * side + f32::MIN_POSITIVE);
+        let margin = DVec3::splat(1e-4 * side + f64::from(f32::MIN_POSITIVE));
         let (lo, hi) = (lo - margin, hi + margin);
-        let edge = (hi - lo).max_element() / cells as f32;
-        let size = ((hi - lo) / edge).to_array().map(|n| (n.ceil() as usize).clamp(1, cells as usize));
-        let mut table = Self { lo, hi, edge, size, quarters: Vec::new() };
+        let extent = (hi - lo).as_vec3();
+        let edge = extent.max_element() / cells as f32;
+        let size = (extent / edge).to_array().map(|n| (n.ceil() as usize).clamp(1, cells as usize));
+        let mut table = Self { lo, extent, edge, size, quarters: Vec::new() };
         let mut squares = vec![f32::INFINITY; size.iter().product()];
         for mesh in meshes {
             for triangle in 0..mesh.triangles.len() as u32 {
@@ -43,11 +46,12 @@ impl Clearance {
     /// Distance that every point within it of `x` is certain to be reached without meeting a triangle [unit]; negative
     /// outside the box.
     #[inline]
-    pub fn at(&self, x: Vec3) -> f32 {
-        if x.cmplt(self.lo).any() || x.cmpgt(self.hi).any() {
+    pub fn at(&self, x: DVec3) -> f32 {
+        let x = (x - self.lo).as_vec3();
+        if x.cmplt(Vec3::ZERO).any() || x.cmpgt(self.extent).any() {
             return -1.0;
         }
-        let cell = (x - self.lo) / self.edge;
+        let cell = x / self.edge;
         let [i, j, k] = [0, 1, 2].map(|a| (cell[a] as usize).min(self.size[a] - 1));
         f32::from(self.quarters[(k * self.size[1] + j) * self.size[0] + i]) * (0.25 * self.edge)
     }
@@ -55,8 +59,8 @@ impl Clearance {
     /// Sets to 0 the cubes that a triangle may touch, and their neighbours: from any other cube to the triangle's own
     /// there lies at least the gap between the two, which is the distance between the centre of the one and the
     /// nearest neighbour of the other.
-    fn mark(&self, corners: [Vec3; 3], squares: &mut [f32]) {
-        let [a, b, c] = corners.map(|p| (p - self.lo) / self.edge);
+    fn mark(&self, corners: [DVec3; 3], squares: &mut [f32]) {
+        let [a, b, c] = corners.map(|p| (p - self.lo).as_vec3() / self.edge);
         let (least, most) = (a.min(b).min(c), a.max(b).max(c));
         let normal = (b - a).cross(c - a).normalize_or_zero();
         // Half the extent of three cubes along the normal, and a little for rounding.
@@ -134,7 +138,7 @@ fn lower_envelope(line: &[f32], hull: &mut Vec<usize>, from: &mut Vec<f32>) {
 mod tests {
     use super::*;
     use crate::geometry::sphere;
-    use crate::math::{DVec3, hash, unit_f32};
+    use crate::math::{hash, unit_f32};
 
     fn distance_to_sphere(x: Vec3, radius: f32) -> f32 {
         (x.length() - radius).abs()
@@ -150,7 +154,7 @@ mod tests {
         for i in 0..20_000_u64 {
             let u = |d: u64| 2.0 * unit_f32((hash(3 * i + d + 1) >> 32) as u32) - 1.0;
             let x = Vec3::new(u(0), u(1), u(2)) * radius;
-            let (bound, truth) = (table.at(x), distance_to_sphere(x, radius));
+            let (bound, truth) = (table.at(x.as_dvec3()), distance_to_sphere(x, radius));
             // The mesh lies up to 2e-3 radii inside the sphere.
             assert!(bound >= 0.0 && bound <= truth + 1e-6, "{x}: {bound} > {truth}");
             (sum, ideal) = (sum + bound, ideal + truth);
@@ -160,13 +164,13 @@ mod tests {
 
     #[test]
     fn large_slanted_triangles_block_their_own_cubes_only_and_outside_is_negative() {
-        let corner = [Vec3::new(-10.0, 0.0, 0.0), Vec3::new(10.0, 0.0, 20.0), Vec3::new(-10.0, 20.0, 20.0)];
-        let mesh = Mesh { positions: corner.to_vec(), triangles: vec![[0, 1, 2]], normals: None };
-        let table = Clearance::new([&mesh], Vec3::splat(-10.0), Vec3::splat(20.0), 60);
-        assert_eq!(table.at(Vec3::new(-3.0, 6.0, 13.0)), 0.0);
-        assert!(table.at(Vec3::new(15.0, 15.0, -5.0)) > 5.0);
-        assert!(table.at(Vec3::splat(21.0)) < 0.0);
-        let empty = Clearance::new([], Vec3::ZERO, Vec3::ONE, 10);
-        assert!(empty.at(Vec3::splat(0.5)) > 5.0);
+        let corner = [DVec3::new(-10.0, 0.0, 0.0), DVec3::new(10.0, 0.0, 20.0), DVec3::new(-10.0, 20.0, 20.0)];
+        let mesh = Mesh { positions: corner.to_vec(), triangles: vec![[0, 1, 2]], ..Mesh::default() };
+        let table = Clearance::new([&mesh], DVec3::splat(-10.0), DVec3::splat(20.0), 60);
+        assert_eq!(table.at(DVec3::new(-3.0, 6.0, 13.0)), 0.0);
+        assert!(table.at(DVec3::new(15.0, 15.0, -5.0)) > 5.0);
+        assert!(table.at(DVec3::splat(21.0)) < 0.0);
+        let empty = Clearance::new([], DVec3::ZERO, DVec3::ONE, 10);
+        assert!(empty.at(DVec3::splat(0.5)) > 5.0);
     }
 }

@@ -1,7 +1,7 @@
 //! Mean curvature of a mesh.
 
 use super::Mesh;
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use std::collections::HashMap;
 
 /// Rounds of averaging at most.
@@ -59,7 +59,8 @@ impl Curvature {
 
     /// At a point of a triangle of `mesh`, the one it was made from; see [`Mesh::point`] for `u` and `v`.
     #[inline]
-    pub fn at(&self, mesh: &Mesh, triangle: u32, u: f32, v: f32) -> f32 {
+    pub fn at(&self, mesh: &Mesh, triangle: u32, u: f64, v: f64) -> f32 {
+        let (u, v) = (u as f32, v as f32);
         let [a, b, c] = mesh.triangles[triangle as usize].map(|i| self.vertices[i as usize]);
         a * (1.0 - u - v) + b * u + c * v
     }
@@ -84,11 +85,11 @@ fn average(values: &mut Vec<f64>, areas: &[f64], edges: &[(u32, u32)], positions
 }
 
 /// For each vertex the number of its place, and the places.
-fn welded(positions: &[Vec3]) -> (Vec<u32>, Vec<DVec3>) {
+fn welded(positions: &[DVec3]) -> (Vec<u32>, Vec<DVec3>) {
     let (mut seen, mut places) = (HashMap::new(), Vec::new());
-    let id = |p: &Vec3| {
-        *seen.entry((*p + Vec3::ZERO).to_array().map(f32::to_bits)).or_insert_with(|| {
-            places.push(p.as_dvec3());
+    let id = |p: &DVec3| {
+        *seen.entry((*p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert_with(|| {
+            places.push(*p);
             places.len() as u32 - 1
         })
     };
@@ -101,8 +102,7 @@ mod tests {
     use crate::geometry::{rectangle, sphere};
 
     fn mesh(made: &crate::geometry::ObjMesh) -> Mesh {
-        let positions = made.positions.iter().map(|p| p.as_vec3()).collect();
-        Mesh { positions, triangles: made.triangles.clone(), normals: None }
+        Mesh { positions: made.positions.clone(), triangles: made.triangles.clone(), ..Mesh::default() }
     }
 
     #[test]
@@ -115,7 +115,7 @@ mod tests {
             for t in (0..ball.triangles.len() as u32).step_by(7) {
                 let found = f64::from(out.at(&ball, t, 0.2, 0.3)) * radius;
                 // A third of the triangles around is not quite the cell of a vertex: 2 %; the poles' needles are worse.
-                let pole = ball.corners(t).iter().any(|p| f64::from((p.y - 2.0).abs()) > 0.99 * radius);
+                let pole = ball.corners(t).iter().any(|p| (p.y - 2.0).abs() > 0.99 * radius);
                 assert!((found - 1.0).abs() < if pole { 0.3 } else { 0.03 }, "triangle {t}: {found}");
                 assert!(
                     (inwards.at(&inside_out, t, 0.2, 0.3) + out.at(&ball, t, 0.3, 0.2)).abs() < 0.05 / radius as f32
@@ -135,7 +135,7 @@ mod tests {
         let loose = Mesh {
             positions,
             triangles: (0..ball.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-            normals: None,
+            ..Mesh::default()
         };
         let (one, other) = (Curvature::new(&ball, 0.1), Curvature::new(&loose, 0.1));
         for t in 0..ball.triangles.len() as u32 {

@@ -40,7 +40,7 @@ impl Findings {
 
 /// Looks at the mesh as it is rendered.
 pub fn examine(mesh: &Mesh) -> Findings {
-    let point = |i: u32| mesh.positions[i as usize].as_dvec3();
+    let point = |i: u32| mesh.positions[i as usize];
     let welded = welded(mesh.positions.len(), point);
     let faces = Faces::new(&mesh.triangles, &welded, &point);
     let mut found = Findings {

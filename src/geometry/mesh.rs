@@ -6,11 +6,34 @@ use crate::math::{DVec3, Vec3, hash_combine};
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Vertex positions [unit].
-    pub positions: Vec<Vec3>,
+    pub positions: Vec<DVec3>,
     /// Indices into `positions`, three a triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Shading normals; `None` shades with the triangles' own.
     pub normals: Option<Normals>,
+    /// What rays are traced in, which decides how far from the surface they start.
+    pub precision: Precision,
+}
+
+/// The numbers that rays are traced in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Precision {
+    /// f32, as the ray backends have it.
+    #[default]
+    Single,
+    /// f64, for scenes that f32 cannot hold.
+    Double,
+}
+
+impl Precision {
+    /// Distance from 1 to the next number.
+    #[inline]
+    pub fn epsilon(self) -> f64 {
+        match self {
+            Self::Single => f32::EPSILON.into(),
+            Self::Double => f64::EPSILON,
+        }
+    }
 }
 
 /// Shading normals with indices of their own, as OBJ has them.
@@ -26,18 +49,18 @@ pub struct Normals {
 #[derive(Clone, Copy, Debug)]
 pub struct SurfacePoint {
     /// Position [unit].
-    pub x: Vec3,
+    pub x: DVec3,
     /// Unit normal of the triangle, outward.
     pub n_geometric: Vec3,
     /// Unit normal for shading, in the same half space as `n_geometric`.
     pub n: Vec3,
     /// Bound of the rounding error of `x` and of a ray test against the triangle [unit].
-    pub error: f32,
+    pub error: f64,
 }
 
 /// A ray that leaves the surface starts this many units in the last place of the triangle's largest
 /// coordinate away from it: interpolation and the intersection test each lose a few.
-const ERROR_ULPS: f32 = 32.0 * f32::EPSILON;
+const ERROR_ULPS: f64 = 32.0;
 
 /// Sine of the least elevation of a mirrored direction above a surface whose normal was bent for it.
 const LEAST_ELEVATION: f32 = 0.01;
@@ -45,14 +68,14 @@ const LEAST_ELEVATION: f32 = 0.01;
 impl Mesh {
     /// The three corners of a triangle [unit].
     #[inline]
-    pub fn corners(&self, triangle: u32) -> [Vec3; 3] {
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| self.positions[i as usize])
     }
 
-    /// (b - a) x (c - a) in f64, so that neither needles nor scales of 1e-6 or 1e6 lose it [unit²].
+    /// (b - a) x (c - a), in f64 so that neither needles nor scales of 1e-6 or 1e6 lose it [unit²].
     #[inline]
     pub fn scaled_normal(&self, triangle: u32) -> DVec3 {
-        let [a, b, c] = self.corners(triangle).map(|p| p.as_dvec3());
+        let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a)
     }
 
@@ -69,15 +92,15 @@ impl Mesh {
 
     /// The point a + u (b - a) + v (c - a) of a triangle.
     #[inline]
-    pub fn point(&self, triangle: u32, u: f32, v: f32) -> SurfacePoint {
+    pub fn point(&self, triangle: u32, u: f64, v: f64) -> SurfacePoint {
         let [a, b, c] = self.corners(triangle);
         let n_geometric = self.geometric_normal(triangle);
         let largest = a.abs().max(b.abs()).max(c.abs()).max_element();
         SurfacePoint {
             x: a * (1.0 - u - v) + b * u + c * v,
             n_geometric,
-            n: self.shading_normal(triangle, u, v, n_geometric),
-            error: ERROR_ULPS * largest,
+            n: self.shading_normal(triangle, u as f32, v as f32, n_geometric),
+            error: ERROR_ULPS * self.precision.epsilon() * largest,
         }
     }
 
@@ -100,7 +123,8 @@ impl Mesh {
     pub fn fingerprint(&self) -> u64 {
         let point = |state: u64, p: &Vec3| p.to_array().iter().fold(state, |s, x| hash_combine(s, x.to_bits().into()));
         let index = |state: u64, t: &[u32; 3]| t.iter().fold(state, |s, &i| hash_combine(s, i.into()));
-        let mut state = self.positions.iter().fold(self.positions.len() as u64, point);
+        let place = |state: u64, p: &DVec3| p.to_array().iter().fold(state, |s, x| hash_combine(s, x.to_bits()));
+        let mut state = self.positions.iter().fold(self.positions.len() as u64, place);
         state = self.triangles.iter().fold(state, index);
         if let Some(normals) = &self.normals {
             state = normals.vectors.iter().fold(hash_combine(state, 1), point);
@@ -110,7 +134,7 @@ impl Mesh {
     }
 
     /// Smallest and largest corner of the box around all vertices [unit]; `None` without vertices.
-    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let first = *self.positions.first()?;
         Some(self.positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p))))
     }
@@ -147,8 +171,8 @@ impl SurfacePoint {
     /// Where a ray into `direction` starts so that it cannot meet the surface it leaves: moved along the
     /// geometric normal, to the side of `direction`, by the bound of the error. Scales with the scene.
     #[inline]
-    pub fn leave(&self, direction: Vec3) -> Vec3 {
-        let offset = self.n_geometric * self.error;
+    pub fn leave(&self, direction: Vec3) -> DVec3 {
+        let offset = self.n_geometric.as_dvec3() * self.error;
         if self.n_geometric.dot(direction) < 0.0 { self.x - offset } else { self.x + offset }
     }
 }
@@ -158,7 +182,7 @@ mod tests {
     use super::*;
 
     fn point(n: Vec3) -> SurfacePoint {
-        SurfacePoint { x: Vec3::ZERO, n_geometric: Vec3::Z, n: n.normalize(), error: 0.0 }
+        SurfacePoint { x: DVec3::ZERO, n_geometric: Vec3::Z, n: n.normalize(), error: 0.0 }
     }
 
     #[test]

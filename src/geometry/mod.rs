@@ -16,7 +16,7 @@ pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
 pub use curvature::Curvature;
 pub use doctor::{Findings, Mended, examine, mended};
-pub use mesh::{Mesh, Normals, SurfacePoint};
+pub use mesh::{Mesh, Normals, Precision, SurfacePoint};
 pub use morton::morton_code;
 pub use obj::{LOADING_BYTES, load_obj, write_obj};
 pub use obj_mesh::{ObjMesh, ObjNormals};

@@ -1,13 +1,13 @@
 //! Order along a space-filling curve: neighbours in the list are neighbours in space.
 
-use crate::math::Vec3;
+use crate::math::DVec3;
 
 /// 63-bit Morton code of `p` inside the box `lo`..`hi`, 21 bits an axis.
-pub fn morton_code(p: Vec3, lo: Vec3, hi: Vec3) -> u64 {
+pub fn morton_code(p: DVec3, lo: DVec3, hi: DVec3) -> u64 {
     let extent = (hi - lo).max_element();
     let cells = f64::from(1_u32 << 21) - 1.0;
-    let cell = |offset: f32| {
-        if extent > 0.0 { (f64::from(offset) / f64::from(extent) * cells) as u64 } else { 0 }
+    let cell = |offset: f64| {
+        if extent > 0.0 { (offset / extent * cells) as u64 } else { 0 }
     };
     let q = p - lo;
     spread(cell(q.x)) | spread(cell(q.y)) << 1 | spread(cell(q.z)) << 2
@@ -30,9 +30,9 @@ mod tests {
     #[test]
     fn bits_interleave() {
         assert_eq!(spread(0b101), 0b1_000_001);
-        let one = 1.0 / (f32::from(2_u16).powi(21) - 1.0);
-        assert_eq!(morton_code(Vec3::ZERO, Vec3::ZERO, Vec3::ONE), 0);
-        assert_eq!(morton_code(Vec3::new(0.0, one * 1.5, 0.0), Vec3::ZERO, Vec3::ONE), 0b010);
-        assert_eq!(morton_code(Vec3::ONE, Vec3::ZERO, Vec3::ONE), (1 << 63) - 1);
+        let one = 1.0 / (f64::from(2_u16).powi(21) - 1.0);
+        assert_eq!(morton_code(DVec3::ZERO, DVec3::ZERO, DVec3::ONE), 0);
+        assert_eq!(morton_code(DVec3::new(0.0, one * 1.5, 0.0), DVec3::ZERO, DVec3::ONE), 0b010);
+        assert_eq!(morton_code(DVec3::ONE, DVec3::ZERO, DVec3::ONE), (1 << 63) - 1);
     }
 }

@@ -1,5 +1,5 @@
 //! A mesh in f64 as it is typed or made, on its way into a scene: placed, turned inside out, given smooth normals,
-//! moved to the scene's centre and only then rounded to f32.
+//! moved to the scene's centre.
 
 use glam::DMat3;
 use std::collections::HashMap;
@@ -105,12 +105,12 @@ impl ObjMesh {
         self
     }
 
-    /// The mesh relative to `centre`, rounded to f32. Positions that f32 cannot hold become infinite: check them.
+    /// The mesh relative to `centre`.
     pub fn recentred(&self, centre: DVec3) -> Mesh {
         let mut mesh = Mesh {
-            positions: self.positions.iter().map(|p| (*p - centre).as_vec3()).collect(),
+            positions: self.positions.iter().map(|p| *p - centre).collect(),
             triangles: self.triangles.clone(),
-            normals: None,
+            ..Mesh::default()
         };
         mesh.normals = self.normals.as_ref().map(|normals| {
             let mut vectors: Vec<Vec3> = normals.vectors.iter().map(|n| n.as_vec3().normalize_or(Vec3::Z)).collect();

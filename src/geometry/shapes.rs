@@ -72,7 +72,7 @@ mod tests {
             for t in 0..single.triangles.len() as u32 {
                 assert!(single.area(t) > 0.0);
                 let p = single.point(t, 0.3, 0.3);
-                assert!(p.n.dot(p.n_geometric) > 0.8 && p.n.dot(p.x.normalize()) > 0.999);
+                assert!(p.n.dot(p.n_geometric) > 0.8 && p.n.dot(p.x.as_vec3().normalize()) > 0.999);
             }
         }
         assert!((volume(&sphere(DVec3::splat(5.0), 2.0, 64, 128)) / ideal - 1.0).abs() < 0.01);

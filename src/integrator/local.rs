@@ -42,7 +42,7 @@ impl LocalShape {
     }
 
     /// The shape at a point of a triangle.
-    pub fn at(&self, view: View<'_>, triangle: u32, u: f32, v: f32) -> Local {
+    pub fn at(&self, view: View<'_>, triangle: u32, u: f64, v: f64) -> Local {
         let mesh = &view.scene.objects[self.object as usize].mesh;
         let at = mesh.point(triangle, u, v);
         // The interpolated normal: along rims the facets look anywhere.

@@ -11,7 +11,7 @@ use crate::cache::{
 use crate::error::Result;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Lights, emitted};
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
@@ -216,9 +216,10 @@ impl Subsurface {
             let exit = |&(_, i): &(usize, usize)| {
                 let (w, hit) = (-rays[i].ray.direction, hits[i].as_ref()?);
                 let at = view.point(hit, rays[i].ray.direction);
-                Some(Exit { x: at.x, n: at.normal_seen_from(w), w })
+                let x = (at.x - body.table.centre()).as_vec3();
+                Some((Exit { x, n: at.normal_seen_from(w), w }, at.x))
             };
-            let exits: Vec<Exit> = group.iter().filter_map(exit).collect();
+            let (exits, places): (Vec<Exit>, Vec<DVec3>) = group.iter().filter_map(exit).unzip();
             let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
             let kernel = (&body.model, &body.envelope);
             Clock::time(&mut tally.clock.gather, || {
@@ -228,7 +229,8 @@ impl Subsurface {
                 let even = Density::even();
                 let filler = self.filler(view, group[0].0, body, &body.streams[0], &even);
                 let streams: Vec<PixelStream> = group.iter().map(|&(_, i)| rays[i].stream).collect();
-                near.add(&filler, &exits, &streams, (&mut tally.rays, &mut tally.gather, &mut tally.clock), &mut found);
+                let tally = (&mut tally.rays, &mut tally.gather, &mut tally.clock);
+                near.add(&filler, (&exits, &places), &streams, tally, &mut found);
             }
             for ((&(_, i), exit), &sum) in group.iter().zip(&exits).zip(&found) {
                 inside[i] = sum * transmittance(body.medium.eta, exit.n.dot(exit.w));

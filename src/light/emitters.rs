@@ -2,7 +2,7 @@
 
 use super::{Arrival, LampPoint, Sky};
 use crate::geometry::{AreaTable, SurfacePoint};
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::{Scene, Surface};
@@ -28,7 +28,7 @@ struct Emitter {
     two_sided: bool,
     /// Chance of a point per area [1/unit²]: the emitter's own chance over its area.
     pdf_area: f32,
-    bounds: (Vec3, Vec3),
+    bounds: (DVec3, DVec3),
 }
 
 impl Lights {
@@ -120,7 +120,7 @@ impl Lights {
     /// the surface or leaves the light at its dark side.
     pub fn sample_emitter(&self, scene: &Scene, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
         let lamp = self.point(scene, u)?;
-        let to_light = lamp.at.x - at.x;
+        let to_light = (lamp.at.x - at.x).as_vec3();
         let distance = to_light.length();
         if distance <= 0.0 {
             return None;
@@ -154,12 +154,12 @@ impl Lights {
     /// Share of directions that are better picked by the cosine for a body within `bounds`: half with an environment, none
     /// without, unless an emitter is nearer than it is wide: from there its points have densities that differ without
     /// bound.
-    pub fn cosine_share(&self, (lower, upper): (Vec3, Vec3)) -> f32 {
+    pub fn cosine_share(&self, (lower, upper): (DVec3, DVec3)) -> f32 {
         if self.has_environment() {
             return if self.has_emitters() { 0.5 } else { 1.0 };
         }
         let seen = |e: &Emitter| {
-            let gap = (e.bounds.0 - upper).max(lower - e.bounds.1).max(Vec3::ZERO).length();
+            let gap = (e.bounds.0 - upper).max(lower - e.bounds.1).max(DVec3::ZERO).length() as f32;
             let area = e.table.area() as f32;
             area / (area + PI * gap * gap)
         };

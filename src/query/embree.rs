@@ -3,7 +3,7 @@
 use std::ffi::{CStr, c_char, c_int};
 use std::ptr::NonNull;
 
-use super::{Hit, Ray, RayQuery};
+use super::{Hit, Ray, RayQuery, has_area, rounded};
 use crate::error::{Error, Result};
 use crate::geometry::Mesh;
 use crate::math::Vec3;
@@ -33,7 +33,7 @@ impl Embree {
     /// A usage error with Embree's own text if the library fails its self-check or reports an error.
     pub fn new(meshes: &[&Mesh]) -> Result<Self> {
         let sizes = meshes.iter().flat_map(|m| &m.positions).map(|p| p.abs().max_element());
-        let mut scene = Scene::open(sizes.fold(0.0, f32::max))?;
+        let mut scene = Scene::open(sizes.fold(0.0, f64::max) as f32)?;
         for (number, mesh) in meshes.iter().enumerate() {
             scene.add(number as u32, mesh)?;
         }
@@ -108,14 +108,19 @@ impl RayQuery for Embree {
 impl From<&Ray> for ffi::MarmorRay {
     #[inline]
     fn from(ray: &Ray) -> Self {
-        Self { origin: ray.origin.to_array(), t_min: ray.t_min, direction: ray.direction.to_array(), t_max: ray.t_max }
+        Self {
+            origin: ray.origin.as_vec3().to_array(),
+            t_min: ray.t_min,
+            direction: ray.direction.to_array(),
+            t_max: ray.t_max,
+        }
     }
 }
 
 impl From<ffi::MarmorHit> for Hit {
     #[inline]
     fn from(hit: ffi::MarmorHit) -> Self {
-        Self { t: hit.t, mesh: hit.mesh, triangle: hit.triangle, u: hit.u, v: hit.v }
+        Self { t: hit.t, mesh: hit.mesh, triangle: hit.triangle, u: hit.u.into(), v: hit.v.into() }
     }
 }
 
@@ -150,12 +155,13 @@ impl Scene {
         let triangles: Vec<[u32; 3]> = (0..triangle_count)
             .map(|t| {
                 let corners = mesh.triangles[t as usize];
-                if mesh.area(t) > 0.0 { corners } else { [corners[0]; 3] }
+                if has_area(rounded(mesh, t)) { corners } else { [corners[0]; 3] }
             })
             .collect();
-        let (positions, indices) = (mesh.positions.as_ptr().cast::<f32>(), triangles.as_ptr().cast::<u32>());
+        let positions: Vec<Vec3> = mesh.positions.iter().map(|p| p.as_vec3()).collect();
+        let (positions, indices) = (positions.as_ptr().cast::<f32>(), triangles.as_ptr().cast::<u32>());
         // SAFETY: the scene is open. `positions` has three floats for each of `vertices` and `indices` three numbers for
-        // each of `triangle_count` (sizes asserted above), each below `vertices`, as `Mesh::area` has read every corner;
+        // each of `triangle_count` (sizes asserted above), each below `vertices`, as `rounded` has read every corner;
         // the wrapper copies both and keeps no pointer.
         checked(|message, bytes| unsafe {
             ffi::marmor_scene_add(self.0.as_ptr(), number, positions, vertices, indices, triangle_count, message, bytes)
@@ -191,6 +197,7 @@ fn checked(call: impl FnOnce(*mut c_char, u32) -> c_int) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::DVec3;
 
     #[test]
     fn a_device_error_comes_back_as_embrees_own_text() {
@@ -220,8 +227,11 @@ mod tests {
 
     #[test]
     fn memory_is_counted() {
-        let mesh =
-            Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]; 1000], normals: None };
+        let mesh = Mesh {
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y],
+            triangles: vec![[0, 1, 2]; 1000],
+            ..Mesh::default()
+        };
         let backend = Embree::new(&[&mesh]).unwrap();
         assert!(backend.bytes().unwrap() > 1000 * 12);
         assert!(backend.description().starts_with("embree "));

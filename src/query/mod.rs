@@ -3,7 +3,7 @@
 
 use crate::error::{Error, Result, did_you_mean};
 use crate::geometry::Mesh;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 #[cfg(feature = "bvh")]
 mod bvh;
@@ -18,7 +18,7 @@ pub use tally::RayTally;
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
     /// Start [unit].
-    pub origin: Vec3,
+    pub origin: DVec3,
     /// Direction, of any length above 0; t counts in its lengths.
     pub direction: Vec3,
     /// Open lower end of the interval, at least 0.
@@ -30,14 +30,14 @@ pub struct Ray {
 impl Ray {
     /// From `origin` without end.
     #[inline]
-    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+    pub fn new(origin: DVec3, direction: Vec3) -> Self {
         Self { origin, direction, t_min: 0.0, t_max: f32::INFINITY }
     }
 
     /// The segment between two points; t runs from 0 to 1.
     #[inline]
-    pub fn between(from: Vec3, to: Vec3) -> Self {
-        Self { origin: from, direction: to - from, t_min: 0.0, t_max: 1.0 }
+    pub fn between(from: DVec3, to: DVec3) -> Self {
+        Self { origin: from, direction: (to - from).as_vec3(), t_min: 0.0, t_max: 1.0 }
     }
 }
 
@@ -51,9 +51,9 @@ pub struct Hit {
     /// Index of the triangle in its mesh.
     pub triangle: u32,
     /// Weight of the triangle's second corner.
-    pub u: f32,
+    pub u: f64,
     /// Weight of the triangle's third corner.
-    pub v: f32,
+    pub v: f64,
 }
 
 /// A ray tracer over fixed meshes. Both faces of a triangle are hit; triangles without area never are.
@@ -131,6 +131,17 @@ impl std::str::FromStr for Backend {
             Error::usage(format!("no ray backend `{name}`{hint}; there are `bvh` and `embree`"))
         })
     }
+}
+
+/// The corners of a triangle, rounded as the backends in f32 have them.
+fn rounded(mesh: &Mesh, triangle: u32) -> [Vec3; 3] {
+    mesh.corners(triangle).map(|p| p.as_vec3())
+}
+
+/// Whether rounded corners still span an area.
+fn has_area(corners: [Vec3; 3]) -> bool {
+    let [a, b, c] = corners.map(|p| p.as_dvec3());
+    (b - a).cross(c - a).length() > 0.0
 }
 
 /// Builds a backend over `meshes`, which it may copy or borrow.

@@ -46,7 +46,7 @@ pub fn first_hit(view: View<'_>, window: Window, what: Seen) -> Image {
                 Some(Rgb(at.normal_seen_from(-ray.direction).to_array()))
             }
             Seen::Place => {
-                let x = mesh.point(hit.triangle, hit.u, hit.v).x.as_dvec3() + view.scene.centre;
+                let x = mesh.point(hit.triangle, hit.u, hit.v).x + view.scene.centre;
                 Some(Rgb(x.as_vec3().to_array()))
             }
             Seen::Depth => Some(Rgb::splat((ray.direction * hit.t).dot(camera.forward()))),

@@ -1,6 +1,6 @@
 //! A pinhole camera.
 
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 use crate::query::Ray;
 
 /// A perspective camera; the film's row 0 is at the top, x grows to the right.
@@ -9,7 +9,7 @@ pub struct Camera {
     /// Pixels across and down.
     pub resolution: [u32; 2],
     /// Pinhole [unit], relative to the scene's centre.
-    pub origin: Vec3,
+    pub origin: DVec3,
     /// Unit direction of view.
     forward: Vec3,
     /// Film axis to the right, its length half the film's width at distance 1.
@@ -23,7 +23,7 @@ impl Camera {
     /// are the tangents of half the angles of view. `None` if `forward` and `up` are parallel or zero.
     pub fn new(
         resolution: [u32; 2],
-        origin: Vec3,
+        origin: DVec3,
         forward: Vec3,
         up: Vec3,
         half_width: f32,

@@ -74,8 +74,8 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
         );
     }
     if let Some((lo, hi)) = object.mesh.bounds() {
-        let farthest = f64::from(lo.abs().max(hi.abs()).max_element());
-        let (size, step) = ((hi - lo).as_dvec3().length(), farthest * f64::from(f32::EPSILON));
+        let farthest = lo.abs().max(hi.abs()).max_element();
+        let (size, step) = ((hi - lo).length(), farthest * f64::from(f32::EPSILON));
         if size > 0.0 && step > COARSE * size {
             say(
                 true,

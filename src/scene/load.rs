@@ -37,7 +37,7 @@ impl Scene {
         let mut objects = Vec::with_capacity(placed.len());
         for (entry, mesh) in file.objects.iter().zip(placed) {
             let mesh = mesh.recentred(centre);
-            if let Some(p) = mesh.positions.iter().find(|p| !p.is_finite()) {
+            if let Some(p) = mesh.positions.iter().find(|p| !p.as_vec3().is_finite()) {
                 let what = format!("object {:?}: a vertex ({p}) is too far out for single precision", entry.name);
                 return Err(Error::scene(format!("{}: {what}; use a larger `unit` or a smaller `scale`", entry.at)));
             }
@@ -168,7 +168,7 @@ fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {
     let (half_width, half_height) =
         if vertical { (tangent * width / height, tangent) } else { (tangent, tangent * height / width) };
     let single = |v: DVec3| unit_vector(v).unwrap_or(DVec3::ZERO).as_vec3();
-    let origin = (c.position - centre).as_vec3();
+    let origin = c.position - centre;
     let built: Option<Camera> = Camera::new(
         c.resolution,
         origin,
@@ -178,7 +178,7 @@ fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {
         half_height as f32,
     );
     built
-        .filter(|_| origin.is_finite() && Vec3::new(half_width as f32, half_height as f32, 0.0).is_finite())
+        .filter(|_| origin.as_vec3().is_finite() && Vec3::new(half_width as f32, half_height as f32, 0.0).is_finite())
         .ok_or_else(|| {
             Error::scene(format!(
                 "{}: `camera` cannot be held in single precision; bring it nearer",

@@ -82,7 +82,7 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         if let Surface::Translucent(t) = &scene.materials[object.material].surface
             && let Some((lo, hi)) = object.mesh.bounds()
         {
-            said.extend(thin(t, (hi - lo).as_dvec3().length()).map(|what| format!("{head}: {what}")));
+            said.extend(thin(t, (hi - lo).length()).map(|what| format!("{head}: {what}")));
         }
     }
 }

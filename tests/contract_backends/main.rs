@@ -6,7 +6,7 @@ mod reference;
 mod scenes;
 
 use marmor::geometry::Mesh;
-use marmor::math::Vec3;
+use marmor::math::{DVec3, Vec3};
 use marmor::query::{self, Backend, Ray, RayQuery};
 use reference::{examine, is_open, nearest_in_f64, verdict};
 use scenes::{Draws, bumpy_sphere, mesh_of, placed, rays, soup};
@@ -102,9 +102,9 @@ fn triangles_without_area_are_never_hit_and_needles_are_no_trouble() {
     let mut rays = rays(&mut draws, 500, 1.0, Vec3::ZERO);
     // At the middles of the needles.
     for t in 0..mesh.triangles.len() as u32 {
-        let [a, b, c] = mesh.corners(t);
+        let [a, b, c] = mesh.corners(t).map(|p| p.as_vec3());
         let from = draws.direction() * 3.0;
-        rays.push(Ray::new(from, (a + b + c) / 3.0 - from));
+        rays.push(Ray::new(from.as_dvec3(), (a + b + c) / 3.0 - from));
     }
     let tally = check("needles", &[&mesh], &rays);
     assert!(tally.hits > 50, "{}", tally.hits);
@@ -127,9 +127,9 @@ fn rays_along_the_axes_through_a_grid() {
                 origin.rotate_right((axis + 1) % 3);
                 let mut direction = [0.0, -0.0, sign];
                 direction.rotate_right((axis + 1) % 3);
-                rays.push(Ray::new(Vec3::from_array(origin), Vec3::from_array(direction)));
+                rays.push(Ray::new(Vec3::from_array(origin).as_dvec3(), Vec3::from_array(direction)));
                 direction[(axis + 1) % 3] = 0.5; // one zero is left
-                rays.push(Ray::new(Vec3::from_array(origin), Vec3::from_array(direction)));
+                rays.push(Ray::new(Vec3::from_array(origin).as_dvec3(), Vec3::from_array(direction)));
             }
         }
     }
@@ -143,12 +143,12 @@ fn rays_in_the_plane_of_a_triangle() {
     let mut draws = Draws::new(5);
     let tilted = mesh_of([[draws.point(), draws.point(), draws.point()]]);
     for mesh in [&flat, &tilted] {
-        let [a, b, c] = mesh.corners(0);
+        let [a, b, c] = mesh.corners(0).map(|p| p.as_vec3());
         let rays: Vec<Ray> = (0..300)
             .map(|_| {
                 let mut in_plane = || a + (b - a) * (4.0 * draws.unit() - 2.0) + (c - a) * (4.0 * draws.unit() - 2.0);
                 let from = in_plane();
-                Ray::new(from, in_plane() - from)
+                Ray::new(from.as_dvec3(), in_plane() - from)
             })
             .collect();
         check("in the plane", &[mesh], &rays);
@@ -164,7 +164,7 @@ fn a_closed_mesh_has_no_leaks() {
         let mut draws = Draws::new(6);
         for (backend, query) in backends(&[&mesh]) {
             let leaks = |from: Vec3, to: Vec3| {
-                let ray = Ray::new(from, to - from);
+                let ray = Ray::new(from.as_dvec3(), to - from);
                 let leaks = query.closest(&ray).is_none();
                 assert_eq!(query.occluded(&ray), !leaks, "{}: {ray:?}", backend.name());
                 leaks
@@ -172,9 +172,9 @@ fn a_closed_mesh_has_no_leaks() {
             let mut through_vertices = 0;
             for i in 0..4 {
                 let from = if i == 0 { Vec3::ZERO } else { draws.point() * 0.4 * scale };
-                through_vertices += mesh.positions.iter().filter(|&&p| leaks(from, p)).count();
+                through_vertices += mesh.positions.iter().filter(|p| leaks(from, p.as_vec3())).count();
                 for t in 0..mesh.triangles.len() as u32 {
-                    let [a, b, c] = mesh.corners(t);
+                    let [a, b, c] = mesh.corners(t).map(|p| p.as_vec3());
                     for (a, b) in [(a, b), (b, c), (c, a)] {
                         for s in [0.5, draws.unit()] {
                             let to = a + (b - a) * s;
@@ -217,7 +217,7 @@ fn the_interval_is_open_at_both_ends() {
 #[test]
 fn an_empty_scene_has_no_hits() {
     let empty = Mesh::default();
-    let ray = Ray::new(Vec3::ZERO, Vec3::Z);
+    let ray = Ray::new(DVec3::ZERO, Vec3::Z);
     for meshes in [&[][..], &[&empty], &[&empty, &empty]] {
         for (_, query) in backends(meshes) {
             assert!(query.closest(&ray).is_none() && !query.occluded(&ray));
@@ -240,7 +240,7 @@ fn rays_that_leave_a_surface_do_not_hit_it() {
                         continue;
                     }
                     let u = draws.unit();
-                    let point = mesh.point(triangle, u, draws.unit() * (1.0 - u));
+                    let point = mesh.point(triangle, u.into(), (draws.unit() * (1.0 - u)).into());
                     let mut direction = draws.direction();
                     if i % 4 == 0 {
                         // Grazing: nearly all of the normal taken out.
@@ -273,7 +273,7 @@ fn the_two_backends_agree() {
     let rounding = 2.0 * reference::ROUNDINGS * f64::from(f32::EPSILON) * 3.5; // both may err; 3.5 is the farthest corner
     for _ in 0..count {
         let (from, to) = (draws.direction() * 2.5 * draws.unit(), draws.point() * 0.8);
-        let ray = Ray::new(from, (to - from).normalize());
+        let ray = Ray::new(from.as_dvec3(), (to - from).normalize());
         match (bvh.closest(&ray), embree.closest(&ray)) {
             (Some(a), Some(b)) if a.triangle == b.triangle => {
                 let n = mesh.geometric_normal(a.triangle).dot(ray.direction).abs();
@@ -328,7 +328,7 @@ fn against_f64(count: u32) {
             batch.clear();
             batch.extend((0..1000).map(|_| {
                 let (from, to) = (draws.direction() * (0.2 + 2.0 * draws.unit()), draws.point());
-                Ray::new(from, to - from)
+                Ray::new(from.as_dvec3(), to - from)
             }));
             let (mut found, mut occluded) = (vec![None; batch.len()], vec![false; batch.len()]);
             query.closest_batch(&batch, &mut found);
@@ -395,10 +395,10 @@ fn leaks(count: u32) {
                 let direction = if i % 2 == 0 {
                     draws.direction()
                 } else {
-                    let [a, b, _] = mesh.corners(draws.below(mesh.triangles.len()) as u32);
+                    let [a, b, _] = mesh.corners(draws.below(mesh.triangles.len()) as u32).map(|p| p.as_vec3());
                     a + (b - a) * draws.unit() - from
                 };
-                Ray::new(from, direction)
+                Ray::new(from.as_dvec3(), direction)
             }));
             query.closest_batch(&batch, &mut hits);
             leaks += hits.iter().filter(|h| h.is_none()).count();
@@ -434,10 +434,10 @@ fn batches_from_one_point_are_the_rays_alone() {
             for i in 0..40 * 40 {
                 let [x, y] = [i % 40, i / 40].map(|k| k as f32 * 0.04 - 0.8);
                 let t_max = [f32::INFINITY, 1.0, scale, 1.5 * scale][i % 4];
-                rays.push(Ray { t_max, ..Ray::new(eye, forward + right * x + up * y) });
+                rays.push(Ray { t_max, ..Ray::new(eye.as_dvec3(), forward + right * x + up * y) });
             }
             // And as many without order.
-            rays.extend((0..500).map(|_| Ray::new(draws.point() * scale, draws.direction())));
+            rays.extend((0..500).map(|_| Ray::new((draws.point() * scale).as_dvec3(), draws.direction())));
         }
         for (backend, query) in backends(&[&mesh]) {
             for length in [rays.len(), 1, 7, 100] {

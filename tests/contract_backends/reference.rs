@@ -59,7 +59,7 @@ fn examine_one(mesh: &Mesh, mesh_number: u32, triangle: u32, ray: &Ray) -> Exam 
     let d = ray.direction.as_dvec3();
     let kz = d.abs().max_position();
     let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
-    let p: [DVec3; 3] = mesh.corners(triangle).map(|c| c.as_dvec3() - ray.origin.as_dvec3());
+    let p: [DVec3; 3] = mesh.corners(triangle).map(|c| c - ray.origin);
     // The corners as seen along the ray, which passes through (0, 0).
     let seen = p.map(|p| DVec2::new(p[kx] - d[kx] / d[kz] * p[kz], p[ky] - d[ky] / d[kz] * p[kz]));
     let edge = |c: usize| seen[(c + 2) % 3].perp_dot(seen[(c + 1) % 3]);
@@ -108,10 +108,10 @@ fn examine_one(mesh: &Mesh, mesh_number: u32, triangle: u32, ray: &Ray) -> Exam 
 
 /// The nearest hit by [MT97] in f64: distance and triangle.
 pub fn nearest_in_f64(mesh: &Mesh, ray: &Ray) -> Option<(f64, u32)> {
-    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let (origin, direction) = (ray.origin, ray.direction.as_dvec3());
     let mut nearest: Option<(f64, u32)> = None;
     for triangle in 0..mesh.triangles.len() as u32 {
-        let [a, b, c] = mesh.corners(triangle).map(|p| p.as_dvec3());
+        let [a, b, c] = mesh.corners(triangle);
         let (ab, ac, from) = (b - a, c - a, origin - a);
         let across = direction.cross(ac);
         let inverse = 1.0 / ab.dot(across);
@@ -150,8 +150,7 @@ pub fn verdict(exams: &[Exam], ray: &Ray, found: Option<&Hit>, by_plane: bool) -
         Err(format!("hits what it cannot: {e:?}"))
     } else if off > error(e) {
         Err(format!("at a wrong distance: {e:?}"))
-    } else if e.meets == Meets::Surely
-        && ((f64::from(hit.u) - e.u).abs() > e.weight_error || (f64::from(hit.v) - e.v).abs() > e.weight_error)
+    } else if e.meets == Meets::Surely && ((hit.u - e.u).abs() > e.weight_error || (hit.v - e.v).abs() > e.weight_error)
     {
         Err(format!("with wrong weights: {e:?}"))
     } else if let Some(nearer) = sure.filter(|s| f64::from(hit.t) - error(e) > s.t + error(s)) {

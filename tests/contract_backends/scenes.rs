@@ -1,7 +1,7 @@
 //! Meshes and rays for the backends to agree on.
 
 use marmor::geometry::Mesh;
-use marmor::math::{Vec3, hash_combine, unit_f32};
+use marmor::math::{DVec3, Vec3, hash_combine, unit_f32};
 use marmor::query::Ray;
 
 /// Numbers from a seed.
@@ -45,7 +45,7 @@ pub fn mesh_of(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Mesh {
     let mut mesh = Mesh::default();
     for corners in triangles {
         let base = mesh.positions.len() as u32;
-        mesh.positions.extend(corners);
+        mesh.positions.extend(corners.map(|p| p.as_dvec3()));
         mesh.triangles.push([base, base + 1, base + 2]);
     }
     mesh
@@ -60,7 +60,8 @@ pub fn soup(draws: &mut Draws, n: usize) -> Mesh {
 }
 
 pub fn placed(mesh: &Mesh, scale: f32, offset: Vec3) -> Mesh {
-    Mesh { positions: mesh.positions.iter().map(|&p| p * scale + offset).collect(), ..mesh.clone() }
+    let place = |p: &DVec3| (p.as_vec3() * scale + offset).as_dvec3();
+    Mesh { positions: mesh.positions.iter().map(place).collect(), ..mesh.clone() }
 }
 
 /// From around the cube to a point in it, with directions of any length.
@@ -68,7 +69,7 @@ pub fn rays(draws: &mut Draws, n: usize, scale: f32, offset: Vec3) -> Vec<Ray> {
     (0..n)
         .map(|_| {
             let (from, to) = (draws.direction() * 2.5 * draws.unit() * scale + offset, draws.point() * scale + offset);
-            Ray::new(from, (to - from) * (0.1 + 3.0 * draws.unit()))
+            Ray::new(from.as_dvec3(), (to - from) * (0.1 + 3.0 * draws.unit()))
         })
         .collect()
 }
@@ -80,7 +81,7 @@ pub fn bumpy_sphere(rings: u32) -> Mesh {
         let theta = std::f32::consts::PI * ring as f32 / rings as f32;
         let phi = std::f32::consts::TAU * sector as f32 / sectors as f32;
         let bump = 1.0 + 0.1 * (5.0 * phi).sin() * (7.0 * theta).sin() * theta.sin();
-        Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * bump
+        (Vec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()) * bump).as_dvec3()
     };
     let mut mesh = Mesh::default();
     mesh.positions.push(at(0, 0));

@@ -78,7 +78,7 @@ impl Body {
                 ball(sphere(DVec3::ZERO, radius.into(), rings, 2 * rings))
             }
         };
-        let camera = Camera::new([1, 1], Vec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, 1.0).unwrap();
+        let camera = Camera::new([1, 1], DVec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, 1.0).unwrap();
         let translucent = Translucent {
             medium,
             model: ModelName::Standard,
@@ -116,40 +116,42 @@ impl Body {
         tally
     }
 
-    fn entry(&self, rays: &dyn RayQuery, key: u64) -> (Vec3, Vec3) {
+    fn entry(&self, rays: &dyn RayQuery, key: u64) -> (DVec3, Vec3) {
         match self.shape {
-            Shape::Slab { thickness, .. } => (Vec3::new(0.0, 0.0, -1e-6 * thickness), Vec3::NEG_Z),
+            Shape::Slab { thickness, .. } => (DVec3::new(0.0, 0.0, -1e-6 * f64::from(thickness)), Vec3::NEG_Z),
             Shape::Ball { radius } => {
                 let number = |k: u64| (hash(key ^ k) >> 40) as f32 / (1 << 24) as f32;
                 let (z, phi) = (2.0 * number(0x5eed) - 1.0, std::f32::consts::TAU * number(0xface));
                 let s = (1.0 - z * z).sqrt();
                 let towards = -Vec3::new(s * phi.cos(), s * phi.sin(), z);
-                let hit = rays.closest(&Ray::new(towards * (-2.0 * radius), towards)).unwrap();
+                let hit = rays.closest(&Ray::new((towards * (-2.0 * radius)).as_dvec3(), towards)).unwrap();
                 let at = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
                 (at.leave(-at.n_geometric), -at.n_geometric)
             }
         }
     }
 
-    fn out(&self, start: Vec3, w: Vec3, left: &Left) -> Out {
-        let x = left.x - start;
+    fn out(&self, start: DVec3, w: Vec3, left: &Left) -> Out {
+        let x = (left.x - start).as_vec3();
         let r = (x - w * x.dot(w)).length();
-        let far = matches!(self.shape, Shape::Slab { thickness, .. } if left.x.z < -0.5 * thickness);
+        let far = matches!(self.shape, Shape::Slab { thickness, .. } if left.x.z < -0.5 * f64::from(thickness));
         Out { chord: x.length(), r, far, weight: left.weight[0], order: left.order }
     }
 }
 
 /// A box below z = 0.
 fn slab(thickness: f32, half: f32) -> Mesh {
+    let [thickness, half] = [thickness, half].map(f64::from);
     let mut positions = Vec::new();
     for z in [0.0, -thickness] {
-        positions.extend([[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| Vec3::new(x, y, z)));
+        positions
+            .extend([[-half, -half], [half, -half], [half, half], [-half, half]].map(|[x, y]| DVec3::new(x, y, z)));
     }
     let faces = [[0, 1, 2, 3], [7, 6, 5, 4], [0, 4, 5, 1], [1, 5, 6, 2], [2, 6, 7, 3], [3, 7, 4, 0]];
     let triangles = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-    Mesh { positions, triangles, normals: None }
+    Mesh { positions, triangles, ..Mesh::default() }
 }
 
 fn ball(made: ObjMesh) -> Mesh {
-    Mesh { positions: made.positions.iter().map(|p| p.as_vec3()).collect(), triangles: made.triangles, normals: None }
+    Mesh { positions: made.positions, triangles: made.triangles, ..Mesh::default() }
 }

@@ -6,7 +6,7 @@ use super::spectrum::{Coefficients, Spectrum};
 use super::through::Through;
 use crate::geometry::{Clearance, SurfacePoint};
 use crate::integrator::{View, WalkTally};
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium, reflect, reflectance, refract};
 use crate::query::Ray;
 use crate::sampling::cosine_hemisphere;
@@ -47,7 +47,7 @@ pub struct Edge {
 pub trait Watch {
     /// Light that travelled along `w` is scattered at `x`, by the path's weight `spectrum` (the collision's albedo is in
     /// it). `edge` is the straight flight from the collision before, if no surface lay between. False ends the path.
-    fn collision(&mut self, x: Vec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool;
+    fn collision(&mut self, x: DVec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool;
 }
 
 /// Where and how a path left a body.
@@ -88,7 +88,7 @@ const ROULETTE_BELOW: f32 = 0.25;
 /// What ends a flight, and after which length.
 pub enum Flight {
     /// Its own length.
-    Collision(Vec3),
+    Collision(DVec3),
     /// The body's own boundary from inside, normals outwards.
     Boundary(SurfacePoint, f32),
     /// An opaque surface inside, with its albedo.
@@ -137,14 +137,14 @@ impl Body {
 
     /// From `from` along `w`, a collision at `distance` unless a surface comes first. No ray where the table is sure.
     #[inline]
-    pub fn flight(&self, view: View<'_>, from: Vec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Flight {
+    pub fn flight(&self, view: View<'_>, from: DVec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Flight {
         if distance < self.clearance.at(from) {
             tally.clear += 1;
-            return Flight::Collision(from + w * distance);
+            return Flight::Collision(from + (w * distance).as_dvec3());
         }
         tally.rays += 1;
         let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
-            let x = from + w * distance;
+            let x = from + (w * distance).as_dvec3();
             return if self.endless || self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
         };
         let object = &view.scene.objects[hit.mesh as usize];
@@ -166,7 +166,7 @@ impl Body {
     pub fn walk(
         &self,
         view: View<'_>,
-        (mut from, mut w): (Vec3, Vec3),
+        (mut from, mut w): (DVec3, Vec3),
         spectrum: &mut Spectrum,
         draws: &mut Draws,
         watch: &mut impl Watch,

@@ -10,7 +10,7 @@ use super::through::{lamp_light, share_by_chance};
 use crate::geometry::SurfacePoint;
 use crate::integrator::{Tally, View, WalkTally};
 use crate::light::emitted;
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
@@ -190,7 +190,7 @@ struct Gather<'a, 'b> {
 }
 
 impl Watch for Gather<'_, '_> {
-    fn collision(&mut self, x: Vec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
+    fn collision(&mut self, x: DVec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
         let (path, body) = (&mut *self.path, self.body);
         path.order += 1;
         if path.method.options.orders.none_above(path.order) {

@@ -1,11 +1,11 @@
 //! Photons in cubes of space, to find those within reach of a point.
 
 use super::photons::Photon;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// Photons sorted by the cube they lie in.
 pub struct Cells {
-    lo: Vec3,
+    lo: DVec3,
     edge: f32,
     size: [usize; 3],
     /// Photons before each cube, and their number.
@@ -21,11 +21,11 @@ impl Cells {
     /// `photons` for queries of radius `reach` [unit].
     pub fn new(photons: Vec<Photon>, reach: f32) -> Self {
         let (lo, hi) =
-            photons.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p.x), hi.max(p.x)));
+            photons.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p.x), hi.max(p.x)));
         if photons.is_empty() {
-            return Self { lo: Vec3::ZERO, edge: 1.0, size: [0; 3], starts: vec![0], photons, reach };
+            return Self { lo: DVec3::ZERO, edge: 1.0, size: [0; 3], starts: vec![0], photons, reach };
         }
-        let side = (hi - lo).max(Vec3::splat(1e-6 * reach));
+        let side = (hi - lo).as_vec3().max(Vec3::splat(1e-6 * reach));
         let finest = (side.x as f64 * side.y as f64 * side.z as f64 / MOST_CELLS).cbrt() as f32;
         let longest = side.max_element() / 1000.0;
         let edge = (0.5 * reach).max(finest).max(longest);
@@ -39,7 +39,7 @@ impl Cells {
             cells.starts[i] += cells.starts[i - 1];
         }
         let mut next = cells.starts.clone();
-        let mut sorted = vec![Photon { x: Vec3::ZERO, w: Vec3::ZERO, flux: Default::default() }; cells.photons.len()];
+        let mut sorted = vec![Photon { x: DVec3::ZERO, w: Vec3::ZERO, flux: Default::default() }; cells.photons.len()];
         for (photon, &home) in cells.photons.iter().zip(&homes) {
             sorted[next[home as usize] as usize] = *photon;
             next[home as usize] += 1;
@@ -48,8 +48,8 @@ impl Cells {
         cells
     }
 
-    fn home(&self, x: Vec3) -> u32 {
-        let cell = (x - self.lo) / self.edge;
+    fn home(&self, x: DVec3) -> u32 {
+        let cell = (x - self.lo).as_vec3() / self.edge;
         let [i, j, k] = [0, 1, 2].map(|a| (cell[a].max(0.0) as usize).min(self.size[a] - 1));
         ((k * self.size[1] + j) * self.size[0] + i) as u32
     }
@@ -60,12 +60,12 @@ impl Cells {
     }
 
     /// Rows of cubes that hold every photon within reach of `x`, as ranges of photons; into `rows`. Their number.
-    pub fn near(&self, x: Vec3, rows: &mut Vec<(u32, u32)>) -> u32 {
+    pub fn near(&self, x: DVec3, rows: &mut Vec<(u32, u32)>) -> u32 {
         rows.clear();
         if self.photons.is_empty() {
             return 0;
         }
-        let centre = (x - self.lo) / self.edge;
+        let centre = (x - self.lo).as_vec3() / self.edge;
         let reach = self.reach / self.edge;
         let range = |axis: usize, reach: f32| {
             let n = self.size[axis] as f32;
@@ -119,8 +119,8 @@ mod tests {
     #[test]
     fn every_photon_within_reach_is_in_the_rows() {
         let at = |i: u64| {
-            let u = |d: u64| unit_f32((hash(3 * i + d + 1) >> 32) as u32);
-            Vec3::new(9.0 * u(0), 4.0 * u(1) - 2.0, 0.3 * u(2))
+            let u = |d: u64| f64::from(unit_f32((hash(3 * i + d + 1) >> 32) as u32));
+            DVec3::new(9.0 * u(0), 4.0 * u(1) - 2.0, 0.3 * u(2))
         };
         let photons: Vec<Photon> =
             (0..5000).map(|i| Photon { x: at(i), w: Vec3::Z, flux: Rgb::splat(i as f32) }).collect();
@@ -135,6 +135,6 @@ mod tests {
                 assert!(p.x.distance(x) > 0.7 || found.contains(&p.flux[0]), "{x}: {:?} is missing", p.x);
             }
         }
-        assert_eq!(Cells::new(Vec::new(), 1.0).near(Vec3::ZERO, &mut rows), 0);
+        assert_eq!(Cells::new(Vec::new(), 1.0).near(DVec3::ZERO, &mut rows), 0);
     }
 }

@@ -5,7 +5,7 @@ use super::cells::Cells;
 use super::draws::Draws;
 use super::facets::Crossing;
 use crate::integrator::{View, WalkTally};
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::Ray;
 
 /// Photons looked at from one point; of more, every second, third, ... is taken, with the weight of all.
@@ -15,7 +15,7 @@ const MOST_LOOKED_AT: u32 = 1024;
 #[derive(Default)]
 pub struct Scratch {
     rows: Vec<(u32, u32)>,
-    found: Vec<(Vec3, Rgb)>,
+    found: Vec<(DVec3, Rgb)>,
     pub crossings: Vec<Crossing>,
 }
 
@@ -46,7 +46,7 @@ pub fn connect(
     view: View<'_>,
     body: &Body,
     (cells, yielding): (&Cells, f32),
-    (x, w): (Vec3, Vec3),
+    (x, w): (DVec3, Vec3),
     scratch: &mut Scratch,
     coins: &mut Draws,
     tally: &mut WalkTally,
@@ -68,7 +68,7 @@ pub fn connect(
         while i < photons.len() {
             let photon = &photons[i];
             i += stride as usize;
-            let between = photon.x - x;
+            let between = (photon.x - x).as_vec3();
             let r2 = between.length_squared();
             if r2 >= reach2 {
                 continue;
@@ -103,7 +103,7 @@ pub fn connect(
         let chosen = found.partition_point(|(_, below)| below[c] <= target).min(found.len() - 1);
         if chosen != last.0 {
             let there = found[chosen].0;
-            let visible = there.distance(x) < free || {
+            let visible = there.distance(x) < free.into() || {
                 tally.rays += 1;
                 !view.rays.occluded(&Ray::between(x, there))
             };

@@ -1,7 +1,7 @@
 //! All facets of a body through which light from one point outside is refracted to one point inside.
 
 use crate::geometry::Mesh;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// The triangles of a mesh in a binary tree of balls around places and cones around normals, after [WZHB09], whose tree is
 /// of boxes. 44 bytes a node, 4 a triangle.
@@ -10,6 +10,8 @@ pub struct Facets {
     /// Triangles, those of a leaf together.
     order: Vec<u32>,
     eta: f64,
+    /// What places in the nodes are relative to [unit].
+    origin: DVec3,
     /// Cosine and sine of the largest angle by which the boundary turns light: cos = min(η, 1/η).
     turn: [f32; 2],
 }
@@ -33,8 +35,8 @@ struct Node {
 pub struct Crossing {
     pub triangle: u32,
     /// Barycentric coordinates of the place, as `Mesh::point` takes them.
-    pub u: f32,
-    pub v: f32,
+    pub u: f64,
+    pub v: f64,
     pub bend: Bend,
     /// Unit direction inside, outwards.
     pub inside: Vec3,
@@ -77,11 +79,17 @@ struct Item {
 impl Facets {
     /// The tree of `mesh`; triangles without area are left out. `eta` = n_inside / n_outside. `None` without triangles.
     pub fn new(mesh: &Mesh, eta: f32) -> Option<Self> {
+        let (lo, hi) = mesh.bounds()?;
+        let origin = 0.5 * lo + 0.5 * hi;
         let mut items: Vec<Item> = (0..mesh.triangles.len() as u32)
             .filter_map(|triangle| {
                 let normal = mesh.geometric_normal(triangle);
                 let [a, b, c] = mesh.corners(triangle);
-                (normal != Vec3::ZERO).then_some(Item { triangle, middle: (a + b + c) / 3.0, normal })
+                (normal != Vec3::ZERO).then_some(Item {
+                    triangle,
+                    middle: ((a + b + c) / 3.0 - origin).as_vec3(),
+                    normal,
+                })
             })
             .collect();
         if items.is_empty() {
@@ -89,7 +97,8 @@ impl Facets {
         }
         let cosine = eta.min(1.0 / eta);
         let turn = [cosine, (1.0 - cosine * cosine).max(0.0).sqrt()];
-        let mut facets = Self { nodes: Vec::new(), order: Vec::with_capacity(items.len()), eta: eta.into(), turn };
+        let order = Vec::with_capacity(items.len());
+        let mut facets = Self { nodes: Vec::new(), order, eta: eta.into(), origin, turn };
         facets.build(mesh, &mut items);
         Some(facets)
     }
@@ -97,7 +106,7 @@ impl Facets {
     /// Appends the node of `items` and all below it.
     fn build(&mut self, mesh: &Mesh, items: &mut [Item]) {
         let index = self.nodes.len();
-        self.nodes.push(Node::around(mesh, items));
+        self.nodes.push(Node::around(mesh, self.origin, items));
         if items.len() <= LEAF {
             self.nodes[index].first = self.order.len() as u32;
             self.nodes[index].count = items.len() as u32;
@@ -119,15 +128,16 @@ impl Facets {
 
     /// Puts into `found` every crossing between `x`, inside, and `p`, outside, that is at most `horizon` from `x`;
     /// whether anything stands in the way is not asked. Returns how many nodes were looked at.
-    pub fn crossings(&self, mesh: &Mesh, x: Vec3, p: Vec3, horizon: f32, found: &mut Vec<Crossing>) -> u32 {
+    pub fn crossings(&self, mesh: &Mesh, x: DVec3, p: DVec3, horizon: f32, found: &mut Vec<Crossing>) -> u32 {
         found.clear();
         // Halving leaves one node for each level below the first: 32 for 2^32 triangles.
         let (mut stack, mut waiting, mut seen) = ([0_u32; 40], 0, 0);
         let mut index = 0_u32;
+        let [local, lamp] = [x, p].map(|q| (q - self.origin).as_vec3());
         loop {
             let node = &self.nodes[index as usize];
             seen += 1;
-            if self.may_hold(node, x, p, horizon) {
+            if self.may_hold(node, local, lamp, horizon) {
                 if node.count == 0 {
                     stack[waiting] = node.first;
                     waiting += 1;
@@ -191,11 +201,11 @@ impl Facets {
     }
 
     /// The crossing at one facet.
-    fn crossing(&self, mesh: &Mesh, triangle: u32, x: Vec3, p: Vec3) -> Option<Crossing> {
-        let corners = mesh.corners(triangle).map(|q| q.as_dvec3() - x.as_dvec3());
+    fn crossing(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: DVec3) -> Option<Crossing> {
+        let corners = mesh.corners(triangle).map(|q| q - x);
         let [a, b, c] = corners;
         let scaled = (b - a).cross(c - a);
-        let (lamp, size) = (p.as_dvec3() - x.as_dvec3(), scaled.length());
+        let (lamp, size) = (p - x, scaled.length());
         let n = scaled / size;
         let depth = a.dot(n);
         let height = lamp.dot(n) - depth;
@@ -231,8 +241,8 @@ impl Facets {
         let (inner, outer) = (length(depth, s), length(height, distance - s));
         Some(Crossing {
             triangle,
-            u: u as f32,
-            v: v as f32,
+            u,
+            v,
             bend: Bend { lengths: [inner, outer], cosines: [depth / inner, height / outer] },
             inside: (y / inner).as_vec3(),
             outside: ((lamp - y) / outer).as_vec3(),
@@ -241,8 +251,8 @@ impl Facets {
 }
 
 impl Node {
-    fn around(mesh: &Mesh, items: &[Item]) -> Self {
-        let corners = || items.iter().flat_map(|i| mesh.corners(i.triangle));
+    fn around(mesh: &Mesh, origin: DVec3, items: &[Item]) -> Self {
+        let corners = || items.iter().flat_map(|i| mesh.corners(i.triangle)).map(|q| (q - origin).as_vec3());
         let normals = || items.iter().map(|i| i.normal);
         let (lo, hi) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), q| (lo.min(q), hi.max(q)));
         let centre = 0.5 * lo + 0.5 * hi;
@@ -312,15 +322,15 @@ fn length(a: f64, b: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::sphere;
-    use crate::math::{DVec3, hash, unit_f64};
+    use crate::math::{hash, unit_f64};
     use crate::optics::refract;
 
     fn number(i: u64) -> f64 {
         unit_f64((hash(i + 1) >> 32) as u32)
     }
 
-    fn point(i: u64) -> Vec3 {
-        DVec3::from_array([0, 1, 2].map(|d| 2.0 * number(3 * i + d) - 1.0)).as_vec3()
+    fn point(i: u64) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|d| 2.0 * number(3 * i + d) - 1.0))
     }
 
     /// A closed, creased, not convex body: a ball whose radius waves.
@@ -373,7 +383,7 @@ mod tests {
                     let at = mesh.point(c.triangle, c.u, c.v);
                     let inwards = refract(c.outside, at.n_geometric, eta).unwrap();
                     assert!((inwards + c.inside).length() < 1e-3, "{inwards} {c:?}");
-                    assert!(at.x.distance(x + c.inside * c.bend.lengths[0] as f32) < 1e-5);
+                    assert!(at.x.distance(x + c.inside.as_dvec3() * c.bend.lengths[0]) < 1e-5);
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Which translucent objects lie in one another: two media at one place have no meaning here.
 
 use crate::geometry::Mesh;
-use crate::math::{DVec3, Vec3};
+use crate::math::DVec3;
 use crate::scene::{Scene, Surface};
 
 /// Vertices of each object that are looked for inside another.
@@ -26,18 +26,17 @@ pub fn nested(scene: &Scene) -> Option<[&str; 2]> {
 
 fn has_vertex_in(a: &Mesh, b: &Mesh) -> bool {
     let Some((lo, hi)) = b.bounds() else { return false };
-    let inside_box = |p: &&Vec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
-    let candidates: Vec<&Vec3> = a.positions.iter().filter(inside_box).collect();
+    let inside_box = |p: &&DVec3| p.cmpgt(lo).all() && p.cmplt(hi).all();
+    let candidates: Vec<&DVec3> = a.positions.iter().filter(inside_box).collect();
     let step = candidates.len().div_ceil(PROBES).max(1);
     candidates.into_iter().step_by(step).any(|p| winds_around(b, *p))
 }
 
 /// Whether the mesh winds around `p`: its solid angle over 4π [VOS83] is above one half.
-fn winds_around(mesh: &Mesh, p: Vec3) -> bool {
-    let p = p.as_dvec3();
+fn winds_around(mesh: &Mesh, p: DVec3) -> bool {
     let angle: f64 = (0..mesh.triangles.len() as u32)
         .map(|t| {
-            let [a, b, c] = mesh.corners(t).map(|q| q.as_dvec3() - p);
+            let [a, b, c] = mesh.corners(t).map(|q| q - p);
             let (la, lb, lc) = (a.length(), b.length(), c.length());
             let above: f64 = a.dot(DVec3::cross(b, c));
             let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;

@@ -5,13 +5,13 @@ use super::body::{Edge, Watch};
 use super::draws::Draws;
 use super::spectrum::Spectrum;
 use crate::integrator::{View, WalkTally};
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 
 /// Light that has left a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Left {
     /// Where [unit].
-    pub x: Vec3,
+    pub x: DVec3,
     /// Unit direction outside.
     pub w: Vec3,
     /// Its share of the light that entered: the mean over paths is an average of outcomes, at most 3 a path.
@@ -24,7 +24,7 @@ pub struct Left {
 struct Count(u32);
 
 impl Watch for Count {
-    fn collision(&mut self, _: Vec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut Draws) -> bool {
+    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut Draws) -> bool {
         self.0 += 1;
         true
     }
@@ -38,7 +38,7 @@ impl VolumePath {
         &self,
         view: View<'_>,
         object: u32,
-        (x, w): (Vec3, Vec3),
+        (x, w): (DVec3, Vec3),
         u: f32,
         key: u64,
         tally: &mut WalkTally,

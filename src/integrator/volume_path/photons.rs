@@ -7,7 +7,7 @@ use super::spectrum::Spectrum;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::integrator::{View, WalkTally};
 use crate::light::{Arrival, Lights};
-use crate::math::{Rgb, Vec3, hash_combine};
+use crate::math::{DVec3, Rgb, Vec3, hash_combine};
 use crate::optics::{refract, transmittance};
 use crate::query::RayTally;
 use crate::sampling::{CacheStream, Points, Turn};
@@ -19,7 +19,7 @@ use std::f32::consts::PI;
 #[derive(Clone, Copy, Debug)]
 pub struct Photon {
     /// The point [unit].
-    pub x: Vec3,
+    pub x: DVec3,
     /// Unit direction in which the light came.
     pub w: Vec3,
     /// Flux that is scattered [radiance unit x sr x unit²]; all photons of a pass together stand for the whole.
@@ -149,7 +149,7 @@ struct Deposit<'a> {
 }
 
 impl Watch for Deposit<'_> {
-    fn collision(&mut self, x: Vec3, w: Vec3, _: Option<Edge>, spectrum: &mut Spectrum, _: &mut Draws) -> bool {
+    fn collision(&mut self, x: DVec3, w: Vec3, _: Option<Edge>, spectrum: &mut Spectrum, _: &mut Draws) -> bool {
         let beyond = self.body.clearance.at(x) - self.reach;
         let chance = if beyond > 0.0 { (-beyond * self.body.least_extinction).exp().max(LEAST_CHANCE) } else { 1.0 };
         if chance >= 1.0 || self.coins.number() < chance {

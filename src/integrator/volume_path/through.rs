@@ -6,7 +6,7 @@ use super::facets::{Crossing, Facets};
 use super::spectrum::Spectrum;
 use crate::integrator::{View, WalkTally};
 use crate::light::{LampPoint, Lights};
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::transmittance;
 use crate::query::{Hit, Ray};
 use crate::scene::Scene;
@@ -41,7 +41,7 @@ impl Through {
         let phase = (1.0 + g.abs()) / (4.0 * PI * (1.0 - g.abs()).powi(2));
         let is_alone = |lamp: u32| {
             let bounds = scene.objects[lamp as usize].mesh.bounds();
-            let gap = bounds.map_or(0.0, |b| (b.0 - hi).max(lo - b.1).max(Vec3::ZERO).length());
+            let gap = bounds.map_or(0.0, |b| (b.0 - hi).max(lo - b.1).max(DVec3::ZERO).length() as f32);
             // The focus of a flat boundary seen from behind it is at most 1/(η L)² times the cosine's ratio.
             phase / lights.pdf_area(lamp) < ALONE_BELOW * gap * gap * (eta * eta).min(1.0)
         };
@@ -80,7 +80,7 @@ impl Densities {
 pub fn lamp_light(
     view: View<'_>,
     (body, lights): (&Body, &Lights),
-    (x, w): (Vec3, Vec3),
+    (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
     draws: &mut Draws,
@@ -147,7 +147,7 @@ fn line(body: &Body, crossing: &Crossing, lamp: &LampPoint, phase: f32, alone: b
 }
 
 /// Whether nothing stands between `x` and the lamp.
-fn open(view: View<'_>, body: &Body, x: Vec3, crossing: &Crossing, lamp: &LampPoint, tally: &mut WalkTally) -> bool {
+fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, lamp: &LampPoint, tally: &mut WalkTally) -> bool {
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     tally.rays += 1;
     if view.rays.occluded(&Ray::between(x, at.leave(-at.n_geometric))) {
@@ -232,7 +232,7 @@ mod tests {
         for i in 0..samples {
             let mut draws = Draws::new(&[], i);
             // Somewhere in the ball, more often close to its surface.
-            let x = draws.direction() * (0.95 * (1.0 - draws.number().powi(2))) - scene.centre.as_vec3();
+            let x = (draws.direction() * (0.95 * (1.0 - draws.number().powi(2)))).as_dvec3() - scene.centre;
             let w = draws.direction();
             let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
             let mut lucky = [0.0; 2];
@@ -301,7 +301,7 @@ mod tests {
             let (mut found, mut tally, mut most) = (Vec::new(), WalkTally::default(), 0.0_f32);
             for i in 0..100_000 {
                 let mut draws = Draws::new(&[], i);
-                let x = draws.direction() * 0.98 - scene.centre.as_vec3();
+                let x = draws.direction().as_dvec3() * 0.98 - scene.centre;
                 let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
                 let w = draws.direction();
                 let light = lamp_light(view, (body, lights), (x, w), &spectrum, &mut found, &mut draws, &mut tally);

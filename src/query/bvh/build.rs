@@ -14,6 +14,7 @@ use super::triangle::{LANES, Pack};
 use super::walk::STACK;
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Vec3};
+use crate::query::{has_area, rounded};
 
 /// Which triangle of which mesh lies at a place in a pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,7 +200,7 @@ impl<'a> Source<'a> {
     fn new(meshes: &'a [&'a Mesh]) -> (Self, Vec<Ref>) {
         let mut owners = Vec::with_capacity(meshes.iter().map(|m| m.triangles.len()).sum());
         for (mesh, number) in meshes.iter().zip(0..) {
-            let with_area = (0..mesh.triangles.len() as u32).into_par_iter().filter(|&t| mesh.area(t) > 0.0);
+            let with_area = (0..mesh.triangles.len() as u32).into_par_iter().filter(|&t| has_area(rounded(mesh, t)));
             owners.par_extend(with_area.map(|triangle| Owner { mesh: number, triangle }));
         }
         let source = Self { meshes, owners };
@@ -217,7 +218,7 @@ impl<'a> Source<'a> {
     }
 
     fn corners(&self, owner: Owner) -> [Vec3; 3] {
-        self.meshes[owner.mesh as usize].corners(owner.triangle)
+        rounded(self.meshes[owner.mesh as usize], owner.triangle)
     }
 }
 
@@ -242,8 +243,8 @@ mod tests {
         let draw = |i: u32| unit_f32((hash(u64::from(i) + 1) >> 32) as u32);
         let positions =
             (0..3 * n).map(|i| Vec3::new(draw(3 * i), draw(3 * i + 1), draw(3 * i + 2)) + (i / 3) as f32 * 0.1);
-        let positions: Vec<Vec3> = positions.collect();
-        Mesh { positions, triangles: (0..n).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(), normals: None }
+        let triangles = (0..n).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+        Mesh { positions: positions.map(|p| p.as_dvec3()).collect(), triangles, ..Mesh::default() }
     }
 
     /// Every triangle is in the tree once, repeats in a pack aside.

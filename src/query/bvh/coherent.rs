@@ -111,7 +111,7 @@ impl<S: Simd> Packet<S> {
             t_min[i] = ray.t_min;
             t[i] = if i < rays.len() { ray.t_max } else { 0.0 };
         }
-        let origin = splat3(simd, any.origin.to_array());
+        let origin = splat3(simd, any.origin.as_vec3().to_array());
         let d = load3(simd, &directions);
         let (one, widened) = (F8::splat(simd, 1.0), F8::splat(simd, WIDENED));
         let inverse = [one / d[0], one / d[1], one / d[2]];

@@ -43,7 +43,7 @@ impl Bvh {
     fn hit(&self, found: &Found) -> Option<Hit> {
         found.is_hit().then(|| {
             let owner = self.tree.owners[found.place.0 as usize][found.place.1 as usize];
-            Hit { t: found.t, mesh: owner.mesh, triangle: owner.triangle, u: found.u, v: found.v }
+            Hit { t: found.t, mesh: owner.mesh, triangle: owner.triangle, u: found.u.into(), v: found.v.into() }
         })
     }
 }
@@ -80,7 +80,7 @@ impl RayQuery for Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{Vec3, hash, unit_f32};
+    use crate::math::{DVec3, Vec3, hash, unit_f32};
 
     fn point(i: u64) -> Vec3 {
         let draw = |d: u64| unit_f32((hash(3 * i + d + 1) >> 32) as u32);
@@ -91,7 +91,7 @@ mod tests {
         let mut mesh = Mesh::default();
         for corners in triangles {
             let base = mesh.positions.len() as u32;
-            mesh.positions.extend(corners);
+            mesh.positions.extend(corners.map(|p| p.as_dvec3()));
             mesh.triangles.push([base, base + 1, base + 2]);
         }
         mesh
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn nothing_is_hit_where_nothing_has_area() {
-        let ray = Ray::new(Vec3::new(0.5, 0.0, -1.0), Vec3::Z);
+        let ray = Ray::new(DVec3::new(0.5, 0.0, -1.0), Vec3::Z);
         for mesh in [Mesh::default(), mesh_of([[Vec3::ONE; 3], [Vec3::ZERO, Vec3::X, Vec3::X * 2.0]])] {
             let bvh = Bvh::new(&[&mesh]);
             assert!(bvh.closest(&ray).is_none() && !bvh.occluded(&ray));
@@ -118,8 +118,8 @@ mod tests {
             let mut hits = 0;
             for i in 0..200 {
                 let (a, b) = (point(1000 + i) * 3.0 - Vec3::ONE, point(2000 + i));
-                let found = scaled.closest(&Ray::new(a * s, b * s - a * s));
-                let expected = reference.closest(&Ray::new(a, b - a));
+                let found = scaled.closest(&Ray::new((a * s).as_dvec3(), b * s - a * s));
+                let expected = reference.closest(&Ray::new(a.as_dvec3(), b - a));
                 hits += u32::from(expected.is_some());
                 // Rounding of the scaled points moves hits a little, but none of these over an edge.
                 assert_eq!(found.map(|h| h.triangle), expected.map(|h| h.triangle), "10^{exponent}, ray {i}");
@@ -134,9 +134,9 @@ mod tests {
     #[test]
     fn one_hundred_thousand_equal_triangles_are_one_hit() {
         let triangles = vec![[0, 1, 2]; 100_000];
-        let bvh = Bvh::new(&[&Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles, normals: None }]);
+        let bvh = Bvh::new(&[&Mesh { positions: vec![DVec3::ZERO, DVec3::X, DVec3::Y], triangles, ..Mesh::default() }]);
         assert!(bvh.tree.stack_needed <= 96, "{}", bvh.tree.stack_needed);
-        let down = |x: f32| Ray::new(Vec3::new(x, x, 1.0), -Vec3::Z);
+        let down = |x: f64| Ray::new(DVec3::new(x, x, 1.0), -Vec3::Z);
         let hit = bvh.closest(&down(0.25)).unwrap();
         assert_eq!((hit.t, hit.u, hit.v), (1.0, 0.25, 0.25));
         assert!(bvh.occluded(&down(0.25)) && !bvh.occluded(&down(0.75)));
@@ -149,7 +149,7 @@ mod tests {
         let bvh = Bvh::new(&[&mesh_of((0..20_000).map(step))]);
         assert!(bvh.tree.stack_needed <= 96, "{}", bvh.tree.stack_needed);
         for i in (0..20_000).step_by(37) {
-            let hit = bvh.closest(&Ray::new(Vec3::new(i as f32 + 0.25, 0.25, 2.0), -Vec3::Z)).unwrap();
+            let hit = bvh.closest(&Ray::new(DVec3::new(f64::from(i) + 0.25, 0.25, 2.0), -Vec3::Z)).unwrap();
             assert_eq!(hit.triangle, i);
         }
     }
@@ -160,8 +160,8 @@ mod tests {
         let nest = |i: i32| [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| p * 0.5_f32.powi(i) + Vec3::Z * i as f32);
         let bvh = Bvh::new(&[&mesh_of((0..100).map(nest))]);
         for i in 0..100 {
-            let x = 0.25 * 0.5_f32.powi(i);
-            let hit = bvh.closest(&Ray::new(Vec3::new(x, x, i as f32 + 0.5), -Vec3::Z)).unwrap();
+            let x = 0.25 * 0.5_f64.powi(i);
+            let hit = bvh.closest(&Ray::new(DVec3::new(x, x, f64::from(i) + 0.5), -Vec3::Z)).unwrap();
             assert_eq!(hit.triangle, i as u32);
         }
     }
@@ -171,7 +171,7 @@ mod tests {
         let eye = Vec3::new(2.0, 2.0, 32.0);
         let at =
             |i: u32| Vec3::new((i % count) as f32, (i / count) as f32, 0.0) * (4.4 / count as f32) - Vec3::splat(0.2);
-        (0..count * count).map(|i| Ray::new(eye, at(i).with_z(0.0) - eye)).collect()
+        (0..count * count).map(|i| Ray::new(eye.as_dvec3(), at(i).with_z(0.0) - eye)).collect()
     }
 
     /// Where it is flat the camera's rays through its corners are exact: their triangles are met at one distance.
@@ -183,7 +183,8 @@ mod tests {
             let a = cell(i);
             [[a, a + 1, a + 17], [a + 1, a + 18, a + 17]]
         });
-        Mesh { positions: (0..289).map(|i| raised(corner(i))).collect(), triangles: triangles.collect(), normals: None }
+        let positions = (0..289).map(|i| raised(corner(i)).as_dvec3()).collect();
+        Mesh { positions, triangles: triangles.collect(), ..Mesh::default() }
     }
 
     /// Large triangles across each other in one plane: their distances differ by rounding alone.
@@ -201,15 +202,15 @@ mod tests {
             let baseline = Bvh::at(&meshes, Level::Baseline);
             let mut rays = camera(45);
             let from = rays[0].origin;
-            rays.extend(grid.positions.iter().map(|&p| Ray::new(from, p - from)));
+            rays.extend(grid.positions.iter().map(|&p| Ray::new(from, (p - from).as_vec3())));
             // In one quarter, so that they go together.
             let quarter = flat.positions.iter().filter(|p| p.x < from.x && p.y < from.y);
-            rays.extend(quarter.map(|&p| Ray::new(from, p - from)));
+            rays.extend(quarter.map(|&p| Ray::new(from, (p - from).as_vec3())));
             // Intervals that end on the surface, before it and behind.
             let ends = [0.5, 1.0, 1.5].iter().cycle();
             let ends: Vec<Ray> = rays.iter().zip(ends).map(|(r, &t_max)| Ray { t_max, ..*r }).collect();
             rays.extend(ends);
-            rays.extend((0..500).map(|i| Ray::new(point(i) * 4.0, point(1000 + i) - point(2000 + i))));
+            rays.extend((0..500).map(|i| Ray::new(point(i).as_dvec3() * 4.0, point(1000 + i) - point(2000 + i))));
             let alone: Vec<Option<Hit>> = rays.iter().map(|r| baseline.closest(r)).collect();
             let hits = alone.iter().filter(|h| h.is_some()).count();
             assert!(hits > 2000 && hits < rays.len() - 200, "{hits} of {}", rays.len());

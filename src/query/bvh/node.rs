@@ -103,7 +103,7 @@ impl<S: Simd> NodeRay<S> {
     pub fn new(simd: S, ray: &Ray) -> Self {
         let inverse = ray.direction.to_array().map(|d| 1.0 / d);
         let slabs = Slabs {
-            origin: splat3(simd, ray.origin.to_array()),
+            origin: splat3(simd, ray.origin.as_vec3().to_array()),
             inverse: splat3(simd, inverse),
             inverse_far: splat3(simd, inverse.map(|i| i * WIDENED)),
             t_min: F8::splat(simd, ray.t_min),
@@ -196,7 +196,7 @@ impl Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{LaneKernel, Lanes, Level, hash, unit_f32};
+    use crate::math::{DVec3, LaneKernel, Lanes, Level, hash, unit_f32};
 
     struct Enter<'a>(&'a Node, Ray);
 
@@ -223,11 +223,11 @@ mod tests {
         for sign in [1.0, -1.0] {
             for x in [0.0, 0.5, 1.0] {
                 // Along z, with zeros of both signs across it.
-                let ray = Ray::new(Vec3::new(x, 1.0, -3.0 * sign), Vec3::new(0.0, -0.0, sign));
+                let ray = Ray::new(Vec3::new(x, 1.0, -3.0 * sign).as_dvec3(), Vec3::new(0.0, -0.0, sign));
                 assert_eq!(entered(&node, &ray), 1, "{ray:?}");
             }
             for x in [-1e-6, 1.000_001] {
-                let ray = Ray::new(Vec3::new(x, 1.0, -3.0 * sign), Vec3::new(-0.0, 0.0, sign));
+                let ray = Ray::new(Vec3::new(x, 1.0, -3.0 * sign).as_dvec3(), Vec3::new(-0.0, 0.0, sign));
                 assert_eq!(entered(&node, &ray), 0, "{ray:?}");
             }
         }
@@ -236,9 +236,9 @@ mod tests {
     #[test]
     fn a_flat_box_is_entered() {
         let node = Node::new(&[(Child::Leaf(0), (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)))]);
-        assert_eq!(entered(&node, &Ray::new(Vec3::new(0.3, 0.2, 1.7), Vec3::new(0.1, 0.2, -1.0))), 1);
+        assert_eq!(entered(&node, &Ray::new(DVec3::new(0.3, 0.2, 1.7), Vec3::new(0.1, 0.2, -1.0))), 1);
         // In its plane, too: what lies in it decides.
-        assert_eq!(entered(&node, &Ray::new(Vec3::new(-1.0, 0.2, 0.0), Vec3::X)), 1);
+        assert_eq!(entered(&node, &Ray::new(DVec3::new(-1.0, 0.2, 0.0), Vec3::X)), 1);
     }
 
     #[test]
@@ -248,7 +248,7 @@ mod tests {
         let node = Node::new(&boxes);
         assert_eq!(node.children().collect::<Vec<_>>(), [5, 1, 9].map(Child::Leaf));
         for level in Level::available() {
-            let ray = Ray { t_max: 8.0, ..Ray::new(Vec3::new(0.5, 0.5, 0.0), Vec3::Z) };
+            let ray = Ray { t_max: 8.0, ..Ray::new(DVec3::new(0.5, 0.5, 0.0), Vec3::Z) };
             let (lanes, near) = Lanes::at(level).run(Enter(&node, ray));
             assert_eq!((lanes, near[0], near[1]), (0b11, 5.0, 1.0), "{level:?}");
         }
@@ -265,7 +265,7 @@ mod tests {
             let (inner, outer) = ((a.min(b), a.max(b)), (a.min(b).min(c), a.max(b).max(c)));
             let node = Node::new(&[(Child::Leaf(0), inner), (Child::Leaf(1), outer)]);
             let from = point(5 * i + 3) * 3.0 - Vec3::ONE;
-            let ray = Ray::new(from, point(5 * i + 4) - from);
+            let ray = Ray::new(from.as_dvec3(), point(5 * i + 4) - from);
             let (lanes, near) = Lanes::at(Level::best()).run(Enter(&node, ray));
             assert!(lanes != 0b01, "{ray:?} enters {inner:?} but not {outer:?}");
             if lanes == 0b11 {

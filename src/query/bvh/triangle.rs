@@ -233,7 +233,7 @@ impl<S: Simd> TriangleRay<S> {
     #[inline(always)]
     pub fn new(simd: S, ray: &Ray) -> Self {
         let Shear { axes, by } = Shear::new(ray);
-        let origin = ray.origin.to_array();
+        let origin = ray.origin.as_vec3().to_array();
         Self {
             sheared: Sheared {
                 origin: splat3(simd, [origin[axes[0]], origin[axes[1]], origin[axes[2]]]),
@@ -290,7 +290,7 @@ impl Pack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{LaneKernel, Lanes, Level};
+    use crate::math::{DVec3, LaneKernel, Lanes, Level};
 
     const RIGHT: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
@@ -324,7 +324,7 @@ mod tests {
         for turn in 0..3 {
             let turned = |v: Vec3| Vec3::from_array(std::array::from_fn(|i| v[(i + turn) % 3]));
             for sign in [1.0, -1.0] {
-                let ray = Ray::new(turned(Vec3::new(0.25, 0.5, -2.0 * sign)), turned(Vec3::Z) * sign * 0.5);
+                let ray = Ray::new(turned(Vec3::new(0.25, 0.5, -2.0 * sign)).as_dvec3(), turned(Vec3::Z) * sign * 0.5);
                 let h = hit(RIGHT.map(turned), &ray).unwrap();
                 assert_eq!((h.t, h.u, h.v, h.lane), (4.0, 0.25, 0.5, 0));
             }
@@ -335,7 +335,7 @@ mod tests {
     fn the_nearest_of_a_pack_wins_and_the_interval_is_open() {
         let at = |z: f32| RIGHT.map(|p| p + Vec3::Z * z);
         let pack = Pack::new(&[at(3.0), at(1.0), at(2.0)]);
-        let ray = Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::Z);
+        let ray = Ray::new(DVec3::new(0.25, 0.25, 0.0), Vec3::Z);
         let t = |t_min, t_max| nearest(&pack, Ray { t_min, t_max, ..ray }).map(|h| (h.t, h.lane));
         assert_eq!(t(0.0, f32::INFINITY), Some((1.0, 1)));
         assert_eq!(t(1.0, f32::INFINITY), Some((2.0, 2)));
@@ -347,7 +347,7 @@ mod tests {
         let pack = Pack::new(&[RIGHT]);
         // Inside, and on an edge, where f64 decides.
         for x in [0.25, 0.0] {
-            let ray = Ray { t_max: 3.0, ..Ray::new(Vec3::new(x, 0.25, -1.0), Vec3::Z) };
+            let ray = Ray { t_max: 3.0, ..Ray::new(DVec3::new(x, 0.25, -1.0), Vec3::Z) };
             let t = |enters| nearest_beyond(&pack, ray, enters).map(|h| h.t);
             assert_eq!([t(0.5), t(1.25), t(3.0)], [Some(1.0), Some(1.25), None]);
         }
@@ -356,20 +356,20 @@ mod tests {
     #[test]
     fn a_ray_through_an_edge_or_a_corner_hits() {
         for (x, y) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)] {
-            assert!(hit(RIGHT, &Ray::new(Vec3::new(x, y, 7.0), -Vec3::Z)).is_some(), "{x}, {y}");
+            assert!(hit(RIGHT, &Ray::new(DVec3::new(x, y, 7.0), -Vec3::Z)).is_some(), "{x}, {y}");
         }
     }
 
     #[test]
     fn a_ray_in_the_plane_hits_nothing() {
-        assert!(hit(RIGHT, &Ray::new(Vec3::new(-1.0, 0.25, 0.0), Vec3::X)).is_none());
+        assert!(hit(RIGHT, &Ray::new(DVec3::new(-1.0, 0.25, 0.0), Vec3::X)).is_none());
     }
 
     /// Products of 1e-50 are no f32 numbers.
     #[test]
     fn tiny_triangles_are_left_to_f64() {
         let s = 1e-25;
-        let h = hit(RIGHT.map(|p| p * s), &Ray::new(Vec3::new(0.25, 0.5, -2.0) * s, Vec3::Z)).unwrap();
+        let h = hit(RIGHT.map(|p| p * s), &Ray::new(DVec3::new(0.25, 0.5, -2.0) * f64::from(s), Vec3::Z)).unwrap();
         assert!((h.t / s - 2.0).abs() < 1e-6 && (h.u - 0.25).abs() < 1e-6 && (h.v - 0.5).abs() < 1e-6);
     }
 }
