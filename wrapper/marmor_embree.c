@@ -83,6 +83,7 @@ static int status(MarmorScene *scene, char *message, unsigned message_bytes) {
 
 /* `t` moved by a few units in the last place; ends of intervals are not negative. */
 static float moved(float t, int units) {
+    if (!(t > 0.0f)) return 0.0f; /* -0 is the least of all integers: nothing can be taken off it */
     int bits;
     memcpy(&bits, &t, sizeof bits);
     bits = bits + units > 0 ? bits + units : 0;

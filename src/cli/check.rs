@@ -75,7 +75,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
         scene.objects.iter().map(|o| o.mesh.bytes()).sum::<usize>() as f64 / 1e6,
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );
-    println!("method {} on backend {}", prepared.method.name(), prepared.backend.name());
+    let backend = if scene.why_double.is_some() { "rays in double precision" } else { prepared.backend.name() };
+    println!("method {} on {backend}", prepared.method.name());
     println!("\nobjects");
     for object in &scene.objects {
         let material = &scene.materials[object.material];

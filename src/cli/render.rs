@@ -9,7 +9,7 @@ use super::replay;
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
 use marmor::film::{Film, Format, Image, Window, check_writable};
-use marmor::integrator::{Integrator, View};
+use marmor::integrator::{Integrator, Part, View};
 use marmor::query;
 use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
 use marmor::report::RecordFile;
@@ -216,7 +216,8 @@ impl Task<'_> {
         spent: Spent,
         keeper: &mut Keeper<'_>,
     ) -> Result<Outcome> {
-        let parts = method.parts(view.scene);
+        let mut parts = method.parts(view.scene);
+        parts.push(Part::double_precision(view.scene));
         if self.verbosity == Verbosity::Verbose {
             for part in &parts {
                 eprintln!("  {} {}: {}", if part.built { "built   " } else { "left out" }, part.name, part.why);

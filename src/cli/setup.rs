@@ -82,12 +82,14 @@ impl Method {
     /// What was built and what was left out.
     pub fn parts(&self, scene: &Scene) -> Vec<Part> {
         use marmor::integrator::Integrator as _;
-        match self {
+        let mut parts = match self {
             Self::AmbientOcclusion(m) => m.parts(scene),
             Self::Direct(m) => m.parts(scene),
             Self::Subsurface(m) => m.parts(scene),
             Self::VolumePath(m) => m.parts(scene),
-        }
+        };
+        parts.push(Part::double_precision(scene));
+        parts
     }
 }
 

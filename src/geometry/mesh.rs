@@ -26,13 +26,14 @@ pub enum Precision {
 }
 
 impl Precision {
-    /// Distance from 1 to the next number.
+    /// How far from a surface rays start whose largest coordinate is `largest`.
     #[inline]
-    pub fn epsilon(self) -> f64 {
-        match self {
+    pub fn error(self, largest: f64) -> f64 {
+        let epsilon = match self {
             Self::Single => f32::EPSILON.into(),
             Self::Double => f64::EPSILON,
-        }
+        };
+        ERROR_ULPS * epsilon * largest
     }
 }
 
@@ -61,6 +62,9 @@ pub struct SurfacePoint {
 /// A ray that leaves the surface starts this many units in the last place of the triangle's largest
 /// coordinate away from it: interpolation and the intersection test each lose a few.
 const ERROR_ULPS: f64 = 32.0;
+
+/// Share of its length by which rounding its direction to f32 may move a segment's end, with a factor of 4 to spare.
+const SEGMENT_ERROR: f64 = 4.0 * f32::EPSILON as f64;
 
 /// Sine of the least elevation of a mirrored direction above a surface whose normal was bent for it.
 const LEAST_ELEVATION: f32 = 0.01;
@@ -100,7 +104,7 @@ impl Mesh {
             x: a * (1.0 - u - v) + b * u + c * v,
             n_geometric,
             n: self.shading_normal(triangle, u as f32, v as f32, n_geometric),
-            error: ERROR_ULPS * self.precision.epsilon() * largest,
+            error: self.precision.error(largest),
         }
     }
 
@@ -172,7 +176,19 @@ impl SurfacePoint {
     /// geometric normal, to the side of `direction`, by the bound of the error. Scales with the scene.
     #[inline]
     pub fn leave(&self, direction: Vec3) -> DVec3 {
-        let offset = self.n_geometric.as_dvec3() * self.error;
+        self.aside(direction, self.error)
+    }
+
+    /// Where a segment along `w` ends that comes from `from`, a place known up to `error`: as [`Self::leave`] against `w`, and at
+    /// least as far from the surface as rounding can move the segment's end.
+    #[inline]
+    pub fn arrive(&self, w: Vec3, from: DVec3, error: f64) -> DVec3 {
+        self.aside(-w, self.error.max(error).max(SEGMENT_ERROR * from.distance(self.x)))
+    }
+
+    #[inline]
+    fn aside(&self, direction: Vec3, distance: f64) -> DVec3 {
+        let offset = self.n_geometric.as_dvec3() * distance;
         if self.n_geometric.dot(direction) < 0.0 { self.x - offset } else { self.x + offset }
     }
 }

@@ -135,6 +135,15 @@ impl Part {
         Self { name: name.into(), built: true, why: why.into() }
     }
 
+    /// Rays in f64, which take the place of the backend where f32 cannot hold a scene.
+    pub fn double_precision(scene: &Scene) -> Self {
+        let name = "rays in double precision";
+        match &scene.why_double {
+            Some(why) => Self::built(name, format!("in place of the backend: {why}")),
+            None => Self::left_out(name, "single precision holds the scene"),
+        }
+    }
+
     /// A part that is left out.
     pub fn left_out(name: impl Into<String>, why: impl Into<String>) -> Self {
         Self { name: name.into(), built: false, why: why.into() }

@@ -132,7 +132,7 @@ impl Lights {
         }
         // Divided one length at a time: distance² leaves the range of f32 long before the quotient does.
         let solid_angle = cos_light / distance / distance / lamp.pdf_area;
-        let shadow = Ray::between(at.leave(w), lamp.at.leave(-w));
+        let shadow = Ray::between(at.leave(w), lamp.at.arrive(w, at.x, at.error));
         Some(Arrival { w, irradiance: lamp.radiance * (cos * solid_angle), pdf_angle: 1.0 / solid_angle, shadow })
     }
 

@@ -1,8 +1,9 @@
 //! Where a ray first meets the scene. Not for: what is found there (`scene`).
-//! Read first: [`RayQuery`]; each backend is one file behind it, and nothing else names a backend's types.
+//! Read first: [`RayQuery`]; each backend is one file behind it, and nothing else names a backend's types. `exact.rs` takes the
+//! place of either where f32 cannot hold a scene.
 
 use crate::error::{Error, Result, did_you_mean};
-use crate::geometry::Mesh;
+use crate::geometry::{Mesh, Precision};
 use crate::math::{DVec3, Vec3};
 
 #[cfg(feature = "bvh")]
@@ -10,6 +11,7 @@ mod bvh;
 #[cfg(feature = "embree")]
 #[allow(unsafe_code)] // the one room that talks to C; every block says what makes it sound
 mod embree;
+mod exact;
 mod tally;
 
 pub use tally::RayTally;
@@ -133,6 +135,11 @@ impl std::str::FromStr for Backend {
     }
 }
 
+/// Rays against `meshes` in f64, many times slower than the backends: for what f32 cannot hold, and to hold them against.
+pub fn exact(meshes: &[&Mesh]) -> Box<dyn RayQuery> {
+    Box::new(exact::Exact::new(meshes))
+}
+
 /// The corners of a triangle, rounded as the backends in f32 have them.
 fn rounded(mesh: &Mesh, triangle: u32) -> [Vec3; 3] {
     mesh.corners(triangle).map(|p| p.as_vec3())
@@ -144,12 +151,13 @@ fn has_area(corners: [Vec3; 3]) -> bool {
     (b - a).cross(c - a).length() > 0.0
 }
 
-/// Builds a backend over `meshes`, which it may copy or borrow.
+/// Builds a backend over `meshes`, which it copies: [`exact`] where one of them asks for [`Precision::Double`].
 ///
 /// # Errors
 /// A usage error if the backend is not in this build, or a library does not work.
-pub fn build<'a>(backend: Backend, meshes: &[&'a Mesh]) -> Result<Box<dyn RayQuery + 'a>> {
+pub fn build(backend: Backend, meshes: &[&Mesh]) -> Result<Box<dyn RayQuery>> {
     match backend {
+        _ if meshes.iter().any(|m| m.precision == Precision::Double) => Ok(exact(meshes)),
         #[cfg(feature = "bvh")]
         Backend::Bvh => Ok(Box::new(bvh::Bvh::new(meshes))),
         #[cfg(feature = "embree")]

@@ -12,7 +12,7 @@ pub struct Remark {
 }
 
 /// Vertices lie on a grid: a step of more than this share of the object's size shows.
-const COARSE: f64 = 1e-4;
+pub(super) const COARSE: f64 = 1e-4;
 
 /// What there is to say about `object` with this surface; nothing if its mesh is sound.
 pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
@@ -75,12 +75,12 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
     }
     if let Some((lo, hi)) = object.mesh.bounds() {
         let farthest = lo.abs().max(hi.abs()).max_element();
-        let (size, step) = ((hi - lo).length(), farthest * f64::from(f32::EPSILON));
+        let (size, step) = ((hi - lo).length(), farthest * f64::EPSILON);
         if size > 0.0 && step > COARSE * size {
             say(
                 true,
                 format!(
-                    "it is {size:.4e} units large and {farthest:.4e} units from the middle of the scene: single \
+                    "it is {size:.4e} units large and {farthest:.4e} units from the middle of the scene: even double \
                      precision puts its vertices on steps of {step:.1e} units; bring it nearer"
                 ),
             );

@@ -7,9 +7,9 @@ use std::rc::Rc;
 use super::file::{FovAxis, SceneFile, unit_vector};
 use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
-use super::{Camera, Material, Object, Scene, Surface, warnings};
+use super::{Camera, Material, Object, Scene, Surface, Translucent, precision, warnings};
 use crate::error::{Error, Result};
-use crate::geometry::{LOADING_BYTES, Mended, Mesh, ObjMesh, examine, load_obj, mended, rectangle, sphere};
+use crate::geometry::{LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere};
 use crate::math::{DVec3, Vec3};
 use crate::memory;
 
@@ -33,7 +33,10 @@ impl Scene {
         let folder = file.path.parent().unwrap_or(Path::new(""));
         let environment = file.environment.load(folder, &mut said)?;
         let placed = meshes(file, folder, repair, &mut said)?;
-        let centre = centre(&placed);
+        let translucent =
+            |entry: &ObjectEntry| matches!(file.materials[entry.material].surface, Surface::Translucent(_));
+        let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| translucent(entry)).map(|(_, mesh)| mesh);
+        let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
         let mut objects = Vec::with_capacity(placed.len());
         for (entry, mesh) in file.objects.iter().zip(placed) {
             let mesh = mesh.recentred(centre);
@@ -52,9 +55,22 @@ impl Scene {
             objects,
             materials: materials(file),
             environment,
+            why_double: None,
             warnings: Vec::new(),
         };
+        let traced = file.method.name == Some(MethodName::VolumePath);
+        let single = file.method.single != Some(false);
+        let walks = |t: &Translucent| traced || single && warnings::no_first_order(t).is_some();
+        let choice = precision::choose(&scene.objects, &scene.materials, walks);
         said.extend(warnings::of(file, &scene));
+        for (number, what) in choice.beyond {
+            let entry = &file.objects[number];
+            said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
+        }
+        if choice.why_double.is_some() {
+            scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
+        }
+        scene.why_double = choice.why_double;
         scene.warnings = said;
         Ok(scene)
     }
@@ -147,13 +163,13 @@ fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<St
     if entry.normals == NormalsChoice::Smooth { mesh.with_smooth_normals() } else { mesh }
 }
 
-/// Middle of the box around everything; halved before it is added, so that it cannot overflow.
-fn centre(meshes: &[ObjMesh]) -> DVec3 {
+/// Middle of the box around all meshes; halved before it is added, so that it cannot overflow.
+fn centre<'a>(meshes: impl IntoIterator<Item = &'a ObjMesh>) -> Option<DVec3> {
     meshes
-        .iter()
+        .into_iter()
         .filter_map(ObjMesh::bounds)
         .reduce(|(lo, hi), (other_lo, other_hi)| (lo.min(other_lo), hi.max(other_hi)))
-        .map_or(DVec3::ZERO, |(lo, hi)| 0.5 * lo + 0.5 * hi)
+        .map(|(lo, hi)| 0.5 * lo + 0.5 * hi)
 }
 
 fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {

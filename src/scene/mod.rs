@@ -11,6 +11,7 @@ mod load;
 mod materials;
 mod objects;
 mod options;
+mod precision;
 mod tree;
 mod warnings;
 mod world;

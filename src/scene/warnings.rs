@@ -33,7 +33,7 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
 }
 
 /// Models of orders 2 and higher want single scattering beside them.
-fn no_first_order(t: &Translucent) -> Option<String> {
+pub(super) fn no_first_order(t: &Translucent) -> Option<String> {
     struct FirstOrder;
     impl ModelVisitor for FirstOrder {
         type Out = bool;

@@ -13,8 +13,8 @@ pub struct Scene {
     pub name: String,
     /// Length of one unit [mm]; `None` if the file does not say.
     pub unit_in_mm: Option<f64>,
-    /// Where the scene's own origin lies in file coordinates [unit]: the centre of all objects, subtracted in f64
-    /// so that far-off scenes keep their digits.
+    /// Where the scene's own origin lies in file coordinates [unit]: the centre of the translucent objects, or of all where
+    /// there are none. Numbers are finest there.
     pub centre: DVec3,
     /// The camera.
     pub camera: Camera,
@@ -24,6 +24,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Light from every direction that meets no surface; black without one.
     pub environment: Environment,
+    /// Why rays are traced in f64, where they are: the object that f32 cannot hold, with its numbers.
+    pub why_double: Option<String>,
     /// Oddities a user should hear of, in order of the file.
     pub warnings: Vec<String>,
 }

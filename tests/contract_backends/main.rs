@@ -5,16 +5,21 @@
 mod reference;
 mod scenes;
 
-use marmor::geometry::Mesh;
+use marmor::geometry::{Mesh, Precision};
 use marmor::math::{DVec3, Vec3};
 use marmor::query::{self, Backend, Ray, RayQuery};
 use reference::{examine, is_open, nearest_in_f64, verdict};
 use scenes::{Draws, bumpy_sphere, mesh_of, placed, rays, soup};
 
-fn backends<'a>(meshes: &[&'a Mesh]) -> Vec<(Backend, Box<dyn RayQuery + 'a>)> {
-    let built: Vec<Backend> = Backend::ALL.into_iter().filter(|b| b.is_built_in()).collect();
-    assert!(!built.is_empty());
-    built.into_iter().map(|b| (b, query::build(b, meshes).unwrap())).collect()
+const EMBREE: &str = "embree";
+
+/// The backends of this build by name, and the tracer in f64 that takes their place in scenes that f32 cannot hold.
+fn backends(meshes: &[&Mesh]) -> Vec<(&'static str, Box<dyn RayQuery>)> {
+    let built = Backend::ALL.into_iter().filter(|b| b.is_built_in());
+    let mut all: Vec<_> = built.map(|b| (b.name(), query::build(b, meshes).unwrap())).collect();
+    assert!(!all.is_empty());
+    all.push(("exact", query::exact(meshes)));
+    all
 }
 
 /// What the rays of a check came to.
@@ -34,10 +39,10 @@ fn check(what: &str, meshes: &[&Mesh], rays: &[Ray]) -> Tally {
         tally.open += usize::from(is_open(&exams));
         for (backend, query) in &backends {
             let hit = query.closest(ray);
-            if let Err(wrong) = verdict(&exams, ray, hit.as_ref(), *backend == Backend::Embree) {
-                panic!("{what}, {}: {ray:?}\nfound {hit:?}\n{wrong}", backend.name());
+            if let Err(wrong) = verdict(&exams, ray, hit.as_ref(), *backend == EMBREE) {
+                panic!("{what}, {}: {ray:?}\nfound {hit:?}\n{wrong}", backend);
             }
-            assert_eq!(query.occluded(ray), hit.is_some(), "{what}, {}: {ray:?} found {hit:?}", backend.name());
+            assert_eq!(query.occluded(ray), hit.is_some(), "{what}, {}: {ray:?} found {hit:?}", backend);
             tally.hits += usize::from(hit.is_some());
         }
     }
@@ -46,7 +51,7 @@ fn check(what: &str, meshes: &[&Mesh], rays: &[Ray]) -> Tally {
         query.closest_batch(rays, &mut hits);
         query.occluded_batch(rays, &mut occluded);
         for (i, ray) in rays.iter().enumerate() {
-            assert_eq!((hits[i], occluded[i]), (query.closest(ray), hits[i].is_some()), "{what}, {}", backend.name());
+            assert_eq!((hits[i], occluded[i]), (query.closest(ray), hits[i].is_some()), "{what}, {}", backend);
         }
     }
     tally.hits /= backends.len();
@@ -166,7 +171,7 @@ fn a_closed_mesh_has_no_leaks() {
             let leaks = |from: Vec3, to: Vec3| {
                 let ray = Ray::new(from.as_dvec3(), to - from);
                 let leaks = query.closest(&ray).is_none();
-                assert_eq!(query.occluded(&ray), !leaks, "{}: {ray:?}", backend.name());
+                assert_eq!(query.occluded(&ray), !leaks, "{}: {ray:?}", backend);
                 leaks
             };
             let mut through_vertices = 0;
@@ -178,13 +183,13 @@ fn a_closed_mesh_has_no_leaks() {
                     for (a, b) in [(a, b), (b, c), (c, a)] {
                         for s in [0.5, draws.unit()] {
                             let to = a + (b - a) * s;
-                            assert!(!leaks(from, to), "{}: from {from} through an edge at {to}", backend.name());
+                            assert!(!leaks(from, to), "{}: from {from} through an edge at {to}", backend);
                         }
                     }
                 }
             }
-            let most = if backend == Backend::Embree { 4 * mesh.positions.len() / 100 } else { 0 };
-            assert!(through_vertices <= most, "{}: {through_vertices} through vertices", backend.name());
+            let most = if backend == EMBREE { 4 * mesh.positions.len() / 100 } else { 0 };
+            assert!(through_vertices <= most, "{}: {through_vertices} through vertices", backend);
         }
     }
 }
@@ -199,12 +204,12 @@ fn the_interval_is_open_at_both_ends() {
         for (backend, query) in &built {
             let Some(first) = query.closest(&ray) else { continue };
             let before = Ray { t_max: first.t, ..ray };
-            assert_eq!(query.closest(&before), None, "{}: {ray:?}", backend.name());
-            assert!(!query.occluded(&before), "{}: {ray:?}", backend.name());
+            assert_eq!(query.closest(&before), None, "{}: {ray:?}", backend);
+            assert!(!query.occluded(&before), "{}: {ray:?}", backend);
             let beyond = Ray { t_min: first.t, ..ray };
             let second = query.closest(&beyond);
-            assert!(second.is_none_or(|s| s.t > first.t), "{}: {ray:?} {first:?} {second:?}", backend.name());
-            assert_eq!(query.occluded(&beyond), second.is_some(), "{}: {ray:?}", backend.name());
+            assert!(second.is_none_or(|s| s.t > first.t), "{}: {ray:?} {first:?} {second:?}", backend);
+            assert_eq!(query.occluded(&beyond), second.is_some(), "{}: {ray:?}", backend);
             twice += usize::from(second.is_some());
             // A hair wider and it is inside.
             let around = Ray { t_min: first.t * 0.999_99, t_max: first.t * 1.000_01, ..ray };
@@ -212,6 +217,23 @@ fn the_interval_is_open_at_both_ends() {
         }
     }
     assert!(twice > 100, "{twice}");
+}
+
+#[test]
+fn an_interval_that_ends_no_later_than_it_begins_is_empty() {
+    let mesh = mesh_of([[Vec3::new(-1.0, -1.0, 1.0), Vec3::new(3.0, -1.0, 1.0), Vec3::new(-1.0, 3.0, 1.0)]]);
+    for (backend, query) in backends(&[&mesh]) {
+        for t_max in [0.0, -0.0, -f32::MIN_POSITIVE, -1.0, f32::NEG_INFINITY, f32::NAN] {
+            for origin in [DVec3::ZERO, DVec3::Z, DVec3::Z * 2.0] {
+                let rays = [Ray { t_max, ..Ray::new(origin, Vec3::Z) }; 20];
+                let (mut hits, mut occluded) = ([None; 20], [false; 20]);
+                query.closest_batch(&rays, &mut hits);
+                query.occluded_batch(&rays, &mut occluded);
+                let alone = (query.closest(&rays[0]), query.occluded(&rays[0]));
+                assert_eq!((alone, hits, occluded), ((None, false), [None; 20], [false; 20]), "{backend}: {t_max}");
+            }
+        }
+    }
 }
 
 #[test]
@@ -250,11 +272,63 @@ fn rays_that_leave_a_surface_do_not_hit_it() {
                     assert!(
                         hit.is_none_or(|h| h.triangle != triangle),
                         "{} at {scale}, {offset} away: {hit:?} from {:?} into {direction}",
-                        backend.name(),
+                        backend,
                         mesh.corners(triangle)
                     );
                 }
             }
+        }
+    }
+}
+
+/// The same in f64, where the bound is half a billion times smaller.
+#[test]
+fn exact_rays_that_leave_a_surface_do_not_hit_it() {
+    let mut draws = Draws::new(14);
+    for offset in [0.0, 1e3, 1e9] {
+        let mut mesh = soup(&mut draws, 200);
+        mesh.precision = Precision::Double;
+        mesh.positions.iter_mut().for_each(|p| *p = *p * 1.1 + DVec3::new(-0.6, 1.0, 0.3) * offset);
+        let query = query::exact(&[&mesh]);
+        for i in 0..20_000 {
+            let triangle = draws.below(mesh.triangles.len()) as u32;
+            let u = f64::from(draws.unit());
+            let point = mesh.point(triangle, u, f64::from(draws.unit()) * (1.0 - u));
+            let mut direction = draws.direction();
+            if i % 4 == 0 {
+                direction -= point.n_geometric * (direction.dot(point.n_geometric) * 0.999);
+            }
+            let from = point.leave(direction);
+            assert!(from.distance(point.x) <= 1e-14 * (2.0 + offset), "{from} {}", point.x);
+            let hit = query.closest(&Ray::new(from, direction));
+            assert!(hit.is_none_or(|h| h.triangle != triangle), "{offset} away: {hit:?} into {direction}");
+        }
+    }
+}
+
+/// Sheets that f32 cannot tell apart, seen from both sides, and what is found on them.
+#[test]
+fn exact_rays_tell_sheets_apart_that_f32_cannot() {
+    let mut draws = Draws::new(15);
+    let corner = |x: f64, y: f64, z: f64| DVec3::new(1e4 * x, 1e4 * y, z + 3.0);
+    let mut mesh = Mesh { precision: Precision::Double, ..Mesh::default() };
+    for i in 0..20 {
+        let z = f64::from(i) * 1e-7;
+        let base = mesh.positions.len() as u32;
+        mesh.positions.extend([corner(-1.0, -1.0, z), corner(1.0, -1.0, z), corner(1.0, 1.0, z), corner(-1.0, 1.0, z)]);
+        mesh.triangles.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+    }
+    let query = query::build(Backend::preferred(), &[&mesh]).unwrap();
+    assert!(query.description().contains("double"), "{}", query.description());
+    for _ in 0..2000 {
+        let place = corner(2.0 * f64::from(draws.unit()) - 1.0, 2.0 * f64::from(draws.unit()) - 1.0, 0.0);
+        let sheet = draws.below(19) as u32;
+        let from = place.with_z(3.0 + (f64::from(sheet) + 0.5) * 1e-7);
+        for (up, met) in [(1.0, sheet + 1), (-1.0, sheet)] {
+            let hit = query.closest(&Ray::new(from, Vec3::new(0.3, -0.2, up))).unwrap();
+            assert_eq!(hit.triangle / 2, met);
+            let at = mesh.point(hit.triangle, hit.u, hit.v).x;
+            assert!(at.distance(from) < 1e-7 && (at.z - mesh.corners(hit.triangle)[0].z).abs() < 1e-14, "{at} {from}");
         }
     }
 }
@@ -307,7 +381,7 @@ fn threads_do_not_disturb_each_other() {
             for _ in 0..4 {
                 scope.spawn(|| {
                     let together: Vec<_> = rays.iter().map(|r| query.closest(r)).collect();
-                    assert!(together == alone, "{}", backend.name());
+                    assert!(together == alone, "{}", backend);
                 });
             }
         });
@@ -336,7 +410,7 @@ fn against_f64(count: u32) {
             for ((ray, hit), occluded) in batch.iter().zip(&found).zip(occluded) {
                 let nearest = nearest_in_f64(&mesh, ray);
                 hits += u32::from(hit.is_some());
-                assert_eq!(hit.is_some(), occluded, "{}: {ray:?}", backend.name());
+                assert_eq!(hit.is_some(), occluded, "{}: {ray:?}", backend);
                 let same = match (hit, nearest) {
                     (Some(hit), Some((t, triangle))) if hit.triangle == triangle => {
                         (f64::from(hit.t) - t).abs() < 16.0 * f64::from(f32::EPSILON) * t.max(1.0)
@@ -348,8 +422,8 @@ fn against_f64(count: u32) {
                     continue;
                 }
                 // Then the ray must be one on which f32 has a choice, and the answer one of those it may give.
-                if let Err(wrong) = verdict(&examine(&meshes, ray), ray, hit.as_ref(), backend == Backend::Embree) {
-                    panic!("{}: {ray:?}\nfound {hit:?}\n{wrong}", backend.name());
+                if let Err(wrong) = verdict(&examine(&meshes, ray), ray, hit.as_ref(), backend == EMBREE) {
+                    panic!("{}: {ray:?}\nfound {hit:?}\n{wrong}", backend);
                 }
                 others += u32::from(hit.is_some() && nearest.is_some());
                 one_sided += u32::from(hit.is_some() != nearest.is_some());
@@ -357,13 +431,13 @@ fn against_f64(count: u32) {
         }
         println!(
             "{}: {count} rays, {hits} hits; other triangle or distance {others}, hit against miss {one_sided} ({:.1e})",
-            backend.name(),
+            backend,
             f64::from(one_sided) * share
         );
         assert!(hits > count / 2);
         // A ray in a million; six standard errors more for few rays.
         let expected = 1e-6 * f64::from(count);
-        assert!(f64::from(one_sided) < expected + 6.0 * expected.sqrt(), "{}: {one_sided}", backend.name());
+        assert!(f64::from(one_sided) < expected + 6.0 * expected.sqrt(), "{}: {one_sided}", backend);
     }
 }
 
@@ -403,8 +477,8 @@ fn leaks(count: u32) {
             query.closest_batch(&batch, &mut hits);
             leaks += hits.iter().filter(|h| h.is_none()).count();
         }
-        println!("{}: {leaks} of {count} rays leave a closed mesh", backend.name());
-        assert_eq!(leaks, 0, "{}", backend.name());
+        println!("{}: {leaks} of {count} rays leave a closed mesh", backend);
+        assert_eq!(leaks, 0, "{}", backend);
     }
 }
 
@@ -446,13 +520,13 @@ fn batches_from_one_point_are_the_rays_alone() {
                 query.occluded_batch(&rays[..length], &mut occluded);
                 for (i, ray) in rays[..length].iter().enumerate() {
                     let alone = query.closest(ray);
-                    assert_eq!(occluded[i], alone.is_some(), "{} at {scale}: {ray:?}", backend.name());
-                    if backend == Backend::Embree && hits[i] != alone {
+                    assert_eq!(occluded[i], alone.is_some(), "{} at {scale}: {ray:?}", backend);
+                    if backend == EMBREE && hits[i] != alone {
                         // On a shared edge its packets may choose the other triangle.
                         ties += 1;
                         verdict(&examine(&[&mesh], ray), ray, hits[i].as_ref(), true).unwrap();
                     } else {
-                        assert_eq!(hits[i], alone, "{} at {scale}: {ray:?}", backend.name());
+                        assert_eq!(hits[i], alone, "{} at {scale}: {ray:?}", backend);
                     }
                 }
                 assert!(ties <= length / 100, "{ties} of {length}");

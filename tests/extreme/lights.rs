@@ -87,7 +87,7 @@ fn no_light_warns() {
 #[test]
 fn a_light_of_1e_minus_12_units_warns() {
     let text = with(&[("edge_u = [1, 0, 0]\nedge_v = [0, 0, 1]", "edge_u = [1e-12, 0, 0]\nedge_v = [0, 0, 1e-12]")]);
-    // So far from the middle its corners fall together in single precision: said where they do.
+    // So far from the middle its corners fall together: said where they do.
     let scene = load(&text).unwrap();
     assert!(scene.warnings.iter().any(|w| w.contains("steps of") || w.contains("no area")), "{:?}", scene.warnings);
     shots(&scene).iter().for_each(super::harness::Shot::assert_sound);

@@ -29,11 +29,17 @@ fn a_thin_sheet_ok() {
     ok(&scene);
 }
 
-/// Thinner than the steps of single precision near its corners: the two faces fall together.
+/// Thinner than the steps of single precision near its corners: rays are traced in f64.
 #[test]
 fn a_sheet_thinner_than_rounding_ok() {
     let text = with(&[(BALL, "mesh = \"box.obj\"\nmaterial = \"wax\"")]);
-    ok(&load_with(&text, &[("box.obj", &cuboid(1.0, 1e-7, 1.0))], false).unwrap());
+    let scene = load_with(&text, &[("box.obj", &cuboid(1.0, 1e-7, 1.0))], false).unwrap();
+    assert!(
+        scene.why_double.as_ref().is_some_and(|why| why.contains("2.000e-7 units thick")),
+        "{:?}",
+        scene.why_double
+    );
+    ok(&scene);
 }
 
 pub fn cuboid(x: f64, y: f64, z: f64) -> String {
@@ -82,9 +88,13 @@ fn a_scene_of_1e9_units_ok() {
 }
 
 #[test]
-fn two_objects_1e9_apart_warns() {
+fn two_objects_1e9_apart_ok() {
     let text = with(&[("centre = [0, 4, 0]", "centre = [0, 1e9, 0]")]);
-    warns(&load(&text).unwrap(), &["single precision puts its vertices on steps of", "bring it nearer"]);
+    let scene = load(&text).unwrap();
+    assert!(scene.why_double.as_ref().is_some_and(|why| why.contains("object \"lamp\"")), "{:?}", scene.why_double);
+    ok(&scene);
+    let text = with(&[("centre = [0, 4, 0]", "centre = [0, 1e18, 0]")]);
+    warns(&load(&text).unwrap(), &["double precision puts its vertices on steps of", "bring it nearer"]);
 }
 
 #[test]

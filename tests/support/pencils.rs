@@ -95,6 +95,7 @@ impl Body {
             objects: vec![Object { name: "body".into(), mesh, material: 0, findings: Findings::default() }],
             materials: vec![Material { name: "body".into(), surface: Surface::Translucent(translucent) }],
             environment: Rgb::BLACK.into(),
+            why_double: None,
             warnings: Vec::new(),
         };
         Self { shape, scene }

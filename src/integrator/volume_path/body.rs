@@ -140,11 +140,11 @@ impl Body {
     pub fn flight(&self, view: View<'_>, from: DVec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Flight {
         if distance < self.clearance.at(from) {
             tally.clear += 1;
-            return Flight::Collision(from + (w * distance).as_dvec3());
+            return Flight::Collision(from + w.as_dvec3() * f64::from(distance));
         }
         tally.rays += 1;
         let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
-            let x = from + (w * distance).as_dvec3();
+            let x = from + w.as_dvec3() * f64::from(distance);
             return if self.endless || self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
         };
         let object = &view.scene.objects[hit.mesh as usize];

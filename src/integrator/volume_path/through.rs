@@ -150,11 +150,11 @@ fn line(body: &Body, crossing: &Crossing, lamp: &LampPoint, phase: f32, alone: b
 fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, lamp: &LampPoint, tally: &mut WalkTally) -> bool {
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     tally.rays += 1;
-    if view.rays.occluded(&Ray::between(x, at.leave(-at.n_geometric))) {
+    if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
         return false;
     }
     tally.rays += 1;
-    let (from, to) = (at.leave(at.n_geometric), lamp.at.leave(-crossing.outside));
+    let (from, to) = (at.leave(crossing.outside), lamp.at.arrive(crossing.outside, at.x, at.error));
     !view.rays.occluded(&Ray::between(from, to))
 }
 
