@@ -276,7 +276,10 @@ fn scene() {
 fn obj() {
     let cube = "# a cube\nmtllib x.mtl\no cube\nv -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\nvn 0 0 1\nvn 0 1 0\nvt 0 0\ng a\nusemtl m\nf 1/1/1 3/1/1 4/1/2 2/1/2\nf 5//1 6//1 8//2 7//2\nf -8 -7 -3 -4\ns off\nf 3 7 8 \\\n 4\nl 1 2\np 1\n";
     let colours = "v 0 0 0 0.1 0.2 0.3\nv 1 0 0 1 1 1\nv 0 1 0 0 0 0\nf 1 2 3\nv 1 1 1 2\nf 2 3 4\n";
-    fuzz("obj", &lines(&[cube, colours]), |bytes, folder| {
+    // A plate with a bridged hole, and a soup of triangles whose corners lie a little apart.
+    let plate = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1 0\nv 1 3 0\nv 3 3 0\nv 3 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1 1//1 5//1 6//1 7//1 8//1 5//1\rf 4 6 7 8 3\n";
+    let soup = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1.00001 0 0\nv 1 1 0\nv 0 0.99999 0\nf -3 -2 -1\nv 0 0 0\nv 0 1 1e-5\nv -1 0 0\nf -3 -2 -1\n";
+    fuzz("obj", &lines(&[cube, colours, plate, soup]), |bytes, folder| {
         let path = folder.join("m.obj");
         std::fs::write(&path, bytes).unwrap();
         let Ok(mesh) = load_obj(&path) else { return false };
@@ -304,6 +307,18 @@ fn exr() {
         std::fs::write(&path, bytes).unwrap();
         let _ = read_attributes(&path);
         let _ = Image::read_exr_layer(&path, Some("sss"));
+        Image::read_exr(&path).is_ok()
+    });
+}
+
+#[test]
+fn hdr() {
+    let flat = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\nPRIMARIES=0.64 0.33 0.29 0.6 0.15 0.06 0.333 0.333\n\n-Y 2 +X 3\n\
+        0123456789abz123\x01\x01\x01\x02";
+    let runs = b"#?RGBE\nFORMAT=32-bit_rle_xyze\n\n+X 2 -Y 9\n\x02\x02\x00\x09\x89a\x04bcde\x85f\x89g\x89\x80\x02\x02\x00\x09\x89a\x04bcde\x85f\x89g\x89\x80";
+    fuzz("hdr", &[flat.to_vec(), runs.to_vec()], |bytes, folder| {
+        let path = folder.join("a.hdr");
+        std::fs::write(&path, bytes).unwrap();
         Image::read_exr(&path).is_ok()
     });
 }

@@ -145,11 +145,8 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
         let target = folder.join(format!("{name}.obj"));
         write_atomically(&target, |out| write_obj(&mesh, out))?;
         eprintln!(
-            "wrote {}: {} triangles without area and {} repeated ones removed, {} turned{}",
+            "wrote {}: {done}{}",
             target.display(),
-            done.zero_area,
-            done.duplicates,
-            done.turned,
             if entry.flip { "; remove `flip` from the object" } else { "" }
         );
     }

@@ -3,6 +3,7 @@
 use super::converge::{file_name, scene_name};
 use super::keep::cancel_on_signals;
 use super::race::{RaceArgs, Runner, command, machine, race};
+use super::read_picture;
 use marmor::Result;
 use marmor::film::{Checkpoint, Format, Image, Metadata, PngOptions, SelfError, metrics, png_bytes, save};
 use marmor::math::Rgb;
@@ -77,7 +78,7 @@ fn stored(path: &Path) -> Result<Truth> {
         let text = format!("{text}, {} samples", film.passes());
         return Ok(Truth { text, image: film.image(), halves: film.half_images(), noise });
     }
-    Ok(Truth { text, image: Image::read_exr(path)?, halves: None, noise: 0.0 })
+    Ok(Truth { text, image: read_picture(path, None)?, halves: None, noise: 0.0 })
 }
 
 /// Longest side of a picture on the page [pixels].

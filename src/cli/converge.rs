@@ -3,6 +3,7 @@
 use super::keep::cancel_on_signals;
 use super::observers::{Records, error_figures};
 use super::race::{RaceArgs, Runner, command, machine, race};
+use super::read_picture;
 use marmor::film::{Image, Window, png_bytes};
 use marmor::report::{Convergence, ErrorCurve, Picture, Record, RecordFile, Reference};
 use marmor::{Error, Result};
@@ -98,7 +99,7 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
 fn reference(args: &RaceArgs, cancel: &AtomicBool) -> Result<(Image, Reference)> {
     if let Some(path) = &args.reference {
         let text = format!("{}, taken as exact", path.display());
-        return Ok((Image::read_exr(path)?, Reference { text, noise: 0.0 }));
+        return Ok((read_picture(path, None)?, Reference { text, noise: 0.0 }));
     }
     let budget = args.reference_budget();
     args.say(&format!("reference: {budget:.0} s"));

@@ -1,5 +1,6 @@
 //! `marmor diff`.
 
+use super::read_picture;
 use marmor::Result;
 use marmor::film::Image;
 use marmor::film::metrics::{self, Comparison, Errors, Estimate};
@@ -11,14 +12,14 @@ use std::process::ExitCode;
 /// Options.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The picture (EXR)
+    /// The picture (EXR or HDR)
     a: PathBuf,
-    /// The reference it is held against (EXR)
+    /// The reference it is held against (EXR or HDR)
     b: PathBuf,
     /// Compare this layer's channels (LAYER.R, LAYER.G, LAYER.B) instead of R, G, B
     #[arg(long, value_name = "LAYER")]
     layer: Option<String>,
-    /// EXR of the same size; where it is not black, the errors are also given for those pixels alone
+    /// EXR or HDR of the same size; where it is not black, the errors are also given for those pixels alone
     #[arg(long, value_name = "MASK.exr")]
     interior: Option<PathBuf>,
     /// Print one JSON object instead of a table
@@ -28,8 +29,8 @@ pub struct Args {
 
 /// Runs the command. Pictures that differ are no failure: the exit code is 0.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let a = Image::read_exr_layer(&args.a, args.layer.as_deref())?;
-    let b = Image::read_exr_layer(&args.b, args.layer.as_deref())?;
+    let a = read_picture(&args.a, args.layer.as_deref())?;
+    let b = read_picture(&args.b, args.layer.as_deref())?;
     let mask = args.interior.as_deref().map(|path| read_mask(path, &a)).transpose()?;
     let comparison = metrics::compare(&a, &b, mask.as_deref())
         .map_err(|e| e.within(format!("{} against {}", args.a.display(), args.b.display())))?;
@@ -38,7 +39,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
 }
 
 fn read_mask(path: &Path, like: &Image) -> Result<Vec<bool>> {
-    let mask = Image::read_exr(path)?;
+    let mask = read_picture(path, None)?;
     if (mask.resolution, mask.window) != (like.resolution, like.window) {
         return Err(marmor::Error::usage(format!("{}: the mask has another size than the pictures", path.display())));
     }

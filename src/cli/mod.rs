@@ -36,7 +36,9 @@ mod setup;
 mod stats;
 
 use clap::{Parser, Subcommand};
+use marmor::film::{FilePicture, Image};
 use marmor::{ErrorKind, Result};
+use std::path::Path;
 use std::process::ExitCode;
 
 #[derive(Parser)]
@@ -70,6 +72,13 @@ enum Command {
 
 /// Exit code of a render that was interrupted and wrote what it had.
 pub const INTERRUPTED: u8 = 75;
+
+/// Reads a picture, and says what was taken how where that is not plain.
+fn read_picture(path: &Path, layer: Option<&str>) -> Result<Image> {
+    let FilePicture { image, remarks, .. } = FilePicture::read(path, layer)?;
+    remarks.iter().for_each(|remark| eprintln!("warning: {}: {remark}", path.display()));
+    Ok(image)
+}
 
 /// Runs the command of this process's arguments.
 pub fn main() -> ExitCode {

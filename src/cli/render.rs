@@ -5,9 +5,9 @@ use super::keep::{KeepArgs, Keeper, cancel_on_signals};
 use super::layers::{LayerName, Layers};
 use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
 use super::outputs::Outputs;
-use super::replay;
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
+use super::{read_picture, replay};
 use marmor::film::{Film, Format, Image, Window, check_writable};
 use marmor::integrator::{Integrator, Part, View};
 use marmor::query;
@@ -100,7 +100,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     if args.keep.samples_range.is_some() && args.pixel.is_none() && !outputs.iter().any(is_film) {
         eprintln!("warning: `marmor merge` needs film files: add -o NAME.film");
     }
-    let reference = args.reference.as_deref().map(Image::read_exr).transpose()?;
+    let reference = args.reference.as_deref().map(|path| read_picture(path, None)).transpose()?;
     let mut builder = rayon::ThreadPoolBuilder::new();
     if let Some(threads) = args.threads {
         if threads > MOST_THREADS {

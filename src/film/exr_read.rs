@@ -1,8 +1,13 @@
-//! Reading OpenEXR of any layout: scan lines or tiles, half or float, one part or several, with layers or without.
+//! Reading OpenEXR of any layout: scan lines or tiles, half or float, one part or several, with layers or without, in any
+//! primaries.
 
-use super::{Attribute, Image, Window};
+use super::exr_header::unreadable;
+use super::exr_layers::{Choice, choose};
+use super::primaries::Primaries;
+use super::{Attribute, FilePicture, Image, Window};
 use crate::math::Rgb;
 use crate::{Error, ErrorKind, Result, memory};
+use ::exr::image::FlatSamples;
 use exr::prelude as exr;
 use exr::{ReadChannels, ReadLayers};
 use std::collections::BTreeMap;
@@ -13,66 +18,89 @@ use std::path::Path;
 /// Bytes of samples that one byte of file may stand for.
 const MOST_COMPRESSION: u128 = 2048;
 
-impl Image {
-    /// Reads the channels `R`, `G`, `B` of an EXR file; alpha and all other channels are ignored. Pixels of the
-    /// data window outside the display window (overscan) are left out.
-    ///
-    /// # Errors
-    /// File: not there, not an EXR file, cut short, channels missing (with the names of those it has), kinds of
-    /// data that are not read (deep data, subsampled channels). Memory if it would not fit.
-    pub fn read_exr(path: &Path) -> Result<Self> {
-        Self::read_exr_layer(path, None)
-    }
+/// The largest finite number of 16 bits.
+const LARGEST_HALF: f32 = 65504.0;
 
-    /// The same of the layer `layer`: channels `layer.R` and so on, or `R` and so on in a part of that name.
-    ///
-    /// # Errors
-    /// As [`Image::read_exr`].
-    pub fn read_exr_layer(path: &Path, layer: Option<&str>) -> Result<Self> {
-        let meta = read_meta(path)?;
-        if meta.headers.iter().all(|h| h.deep) {
-            return Err(Error::file(path, "read", "it holds deep data, which are not supported"));
-        }
-        let bytes = meta.headers.iter().map(|h| h.layer_size.0 as u128 * h.layer_size.1 as u128 * pixel_bytes(h)).sum();
-        // No compression of EXR is better than this: a short file cannot ask for much memory.
-        let length = std::fs::metadata(path).map_or(0, |m| m.len());
-        if bytes > u128::from(length) * MOST_COMPRESSION {
-            return Err(Error::file(path, "read", "the file is cut short or damaged: it is too small for its picture"));
-        }
-        let what = format!("{}: reading it", path.display());
-        memory::require(bytes, memory::available(), &what, "use a smaller picture")?;
-        let (names, part) = find(&meta, layer).ok_or_else(|| no_channels(path, layer, &meta))?;
-
-        let all = exr::read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .all_layers()
-            .all_attributes()
-            .non_parallel()
-            .from_unbuffered(open(path)?)
-            .map_err(|e| read_error(path, e))?;
-        let display = all.attributes.display_window;
-        let read = all
-            .layer_data
-            .iter()
-            .find(|l| {
-                l.attributes.layer_name == part
-                    && names.iter().all(|n| l.channel_data.list.iter().any(|c| c.name.as_slice() == n))
-            })
-            .ok_or_else(|| no_channels(path, layer, &meta))?;
-        let plane = |name: &Vec<u8>| -> Result<Vec<f32>> {
-            let channel = read.channel_data.list.iter().find(|c| c.name.as_slice() == name);
-            let samples = &channel.ok_or_else(|| no_channels(path, layer, &meta))?.sample_data;
-            if samples.len() != read.size.area() {
-                return Err(Error::file(path, "read", "it has subsampled channels, which are not supported"));
-            }
-            Ok(samples.values_as_f32().collect())
-        };
-        let planes = [plane(&names[0])?, plane(&names[1])?, plane(&names[2])?];
-        let pixel = |i: usize| Rgb::from_fn(|c| planes[c][i]);
-        place(path, display, read.absolute_bounds(), pixel)
+/// See [`FilePicture::read`].
+pub(super) fn read(path: &Path, layer: Option<&str>) -> Result<FilePicture> {
+    let meta = read_meta(path)?;
+    let bytes = meta.headers.iter().map(|h| h.layer_size.0 as u128 * h.layer_size.1 as u128 * pixel_bytes(h)).sum();
+    // No compression of EXR is better than this: a short file cannot ask for much memory.
+    let length = std::fs::metadata(path).map_or(0, |m| m.len());
+    if bytes > u128::from(length) * MOST_COMPRESSION {
+        return Err(Error::file(path, "read", "the file is cut short or damaged: it is too small for its picture"));
     }
+    let what = format!("{}: reading it", path.display());
+    memory::require(bytes, memory::available(), &what, "use a smaller picture")?;
+    let Choice { layer: chosen, remark } = choose(&meta.headers, layer)
+        .map_err(|why| if why.is_empty() { no_channels(path, layer, &meta) } else { Error::file(path, "read", why) })?;
+    let mut remarks: Vec<String> = remark.into_iter().collect();
+
+    let all = exr::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .non_parallel()
+        .from_unbuffered(open(path)?)
+        .map_err(|e| read_error(path, e))?;
+    let display = all.attributes.display_window;
+    let read = all
+        .layer_data
+        .iter()
+        .find(|l| {
+            l.attributes.layer_name == chosen.part
+                && chosen.channels.iter().all(|n| l.channel_data.list.iter().any(|c| c.name.as_slice() == n))
+        })
+        .ok_or_else(|| no_channels(path, layer, &meta))?;
+    let mut cut_off = 0_usize;
+    let mut plane = |name: &Vec<u8>| -> Result<Vec<f32>> {
+        let channel = read.channel_data.list.iter().find(|c| c.name.as_slice() == name);
+        let samples = &channel.ok_or_else(|| no_channels(path, layer, &meta))?.sample_data;
+        if samples.len() != read.size.area() {
+            return Err(Error::file(path, "read", "it has subsampled channels, which are not supported"));
+        }
+        let values: Vec<f32> = samples.values_as_f32().collect();
+        if matches!(samples, FlatSamples::F16(_)) {
+            cut_off += values.iter().filter(|v| **v >= LARGEST_HALF).count();
+        }
+        Ok(values)
+    };
+    let planes = chosen.channels.iter().map(&mut plane).collect::<Result<Vec<_>>>()?;
+    if cut_off > 0 {
+        remarks.push(format!(
+            "{cut_off} values are {LARGEST_HALF} or infinite, the end of its 16-bit numbers: what was brighter, a sun perhaps, was \
+             cut off when it was saved; save it with 32-bit floats"
+        ));
+    }
+    let conversion = match all.attributes.chromaticities {
+        None => None,
+        Some(c) => Primaries([c.red, c.green, c.blue, c.white].map(|v| [decimal(v.0), decimal(v.1)]))
+            .to_rec709()
+            .map_err(|why| Error::file(path, "read", why))?,
+    };
+    // A grey is white in its own primaries, which stays white.
+    let conversion = conversion.filter(|_| planes.len() == 3).map(|(conversion, name)| {
+        remarks.push(format!("its primaries are {name}; converted to those of Rec. 709"));
+        conversion
+    });
+    if (all.attributes.pixel_aspect - 1.0).abs() > 1e-3 {
+        remarks
+            .push(format!("its pixels are {} times as wide as high, which is not heeded", all.attributes.pixel_aspect));
+    }
+    let pixel = |i: usize| {
+        let rgb = Rgb::from_fn(|c| planes[c.min(planes.len() - 1)][i]);
+        conversion.map_or(rgb, |conversion| conversion.apply(rgb))
+    };
+    let image = place(path, display, read.absolute_bounds(), pixel)?;
+    let cube = read.attributes.environment_map == Some(::exr::meta::attribute::EnvironmentMap::Cube);
+    Ok(FilePicture { image, remarks, cube })
+}
+
+/// The decimal number that was meant: chromaticities are typed with a few digits, and stored in 32 bits.
+fn decimal(value: f32) -> f64 {
+    (f64::from(value) * 1e6).round() / 1e6
 }
 
 /// The attributes of an EXR file's first part that hold a text or a number, by name; `marmor:*` among them.
@@ -100,17 +128,28 @@ fn open(path: &Path) -> Result<File> {
     }
 }
 
-fn read_meta(path: &Path) -> Result<exr::MetaData> {
-    const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+/// The first bytes of a file, as many as tell its kind.
+pub(super) fn first_bytes(path: &Path) -> Result<Vec<u8>> {
     let mut start = Vec::new();
     open(path)?.take(4).read_to_end(&mut start).map_err(|e| Error::file(path, "read", e))?;
+    Ok(start)
+}
+
+fn read_meta(path: &Path) -> Result<exr::MetaData> {
+    const MAGIC: [u8; 4] = [0x76, 0x2f, 0x31, 0x01];
+    let start = first_bytes(path)?;
     if start != MAGIC {
         let what = match start.as_slice() {
             [] => "the file is empty",
-            [0x89, b'P', b'N', b'G'] => "it is a PNG file; an EXR file is needed",
-            _ => "it is not an EXR file",
+            [0x89, b'P', b'N', b'G'] => "it is a PNG file; an EXR or Radiance HDR file is needed",
+            [0xff, 0xd8, ..] => "it is a JPEG file; an EXR or Radiance HDR file is needed",
+            [b'I', b'I', 42, 0] | [b'M', b'M', 0, 42] => "it is a TIFF file; an EXR or Radiance HDR file is needed",
+            _ => "it is not an EXR file, nor a Radiance HDR file",
         };
         return Err(Error::file(path, "read", what));
+    }
+    if let Some(why) = unreadable(&mut BufReader::new(open(path)?)) {
+        return Err(Error::file(path, "read", why));
     }
     exr::MetaData::read_from_buffered(BufReader::new(open(path)?), false).map_err(|e| read_error(path, e))
 }
@@ -130,30 +169,6 @@ fn read_error(path: &Path, error: exr::Error) -> Error {
 
 fn pixel_bytes(header: &::exr::meta::header::Header) -> u128 {
     header.channels.bytes_per_pixel as u128
-}
-
-/// The full names of the three channels and the part that has them.
-type Found = ([Vec<u8>; 3], Option<exr::Text>);
-
-fn find(meta: &exr::MetaData, layer: Option<&str>) -> Option<Found> {
-    let named = |prefix: &str| ["R", "G", "B"].map(|c| format!("{prefix}{c}").into_bytes());
-    let has = |h: &::exr::meta::header::Header, names: &[Vec<u8>; 3]| {
-        !h.deep && names.iter().all(|n| h.channels.list.iter().any(|c| c.name.as_slice() == n))
-    };
-    let name_of = |h: &::exr::meta::header::Header| h.own_attributes.layer_name.clone();
-    let mut headers = meta.headers.iter();
-    match layer {
-        None => headers.find(|h| has(h, &named(""))).map(|h| (named(""), name_of(h))),
-        Some(layer) => headers.find_map(|h| {
-            let in_part = name_of(h).is_some_and(|part| part.as_slice() == layer.as_bytes());
-            let prefixed = named(&format!("{layer}."));
-            if has(h, &prefixed) {
-                Some((prefixed, name_of(h)))
-            } else {
-                (in_part && has(h, &named(""))).then(|| (named(""), name_of(h)))
-            }
-        }),
-    }
 }
 
 fn no_channels(path: &Path, layer: Option<&str>, meta: &exr::MetaData) -> Error {

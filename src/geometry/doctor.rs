@@ -1,10 +1,12 @@
 //! What is wrong with a mesh, and a mended one: faces without area or there twice, holes, edges of three faces, faces
 //! that look the wrong way. Read first: [`examine`]; docs/robustness.md says what marmor does about each finding.
 
+use super::weld::{Seam, moved_to, seam};
 use super::{Mesh, ObjMesh};
 use crate::math::DVec3;
 use rayon::slice::ParallelSliceMut as _;
 use serde::Serialize;
+use std::collections::HashMap;
 
 /// What [`examine`] found. Vertices at exactly the same place count as one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -17,6 +19,8 @@ pub struct Findings {
     pub duplicates: usize,
     /// Edges of a single triangle: the rims of holes.
     pub open_edges: usize,
+    /// Rims that lie along each other and want welding, if there are any.
+    pub seam: Option<Seam>,
     /// Edges of more than two triangles.
     pub non_manifold_edges: usize,
     /// Edges whose two triangles run along them the same way: one of the two faces the wrong way.
@@ -34,7 +38,7 @@ impl Findings {
 
     /// Whether [`mended`] would change anything but holes and edges of three faces, which it leaves.
     pub fn can_be_mended(&self) -> bool {
-        self.zero_area > 0 || self.duplicates > 0 || self.mixed_edges > 0 || self.inside_out()
+        self.zero_area > 0 || self.duplicates > 0 || self.mixed_edges > 0 || self.seam.is_some() || self.inside_out()
     }
 }
 
@@ -49,13 +53,16 @@ pub fn examine(mesh: &Mesh) -> Findings {
         duplicates: mesh.triangles.len() - faces.zero_area - faces.kept.len(),
         ..Findings::default()
     };
+    let mut open = Vec::new();
     for uses in faces.edges().chunk_by(|a, b| a.0 >> 1 == b.0 >> 1) {
         match uses {
-            [_] => found.open_edges += 1,
+            [edge] => open.push(ends(edge)),
             [a, b] => found.mixed_edges += usize::from(a.0 == b.0),
             _ => found.non_manifold_edges += 1,
         }
     }
+    found.open_edges = open.len();
+    found.seam = faces.seam(&open, &point).map(|(seam, _)| seam);
     if found.open_edges == 0 && found.mixed_edges == 0 && !faces.kept.is_empty() {
         let all: Vec<[u32; 3]> = faces.kept.iter().map(|&t| faces.corners[t as usize]).collect();
         found.volume = Some(volume(&all, &point));
@@ -64,8 +71,10 @@ pub fn examine(mesh: &Mesh) -> Findings {
 }
 
 /// What [`mended`] did.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Mended {
+    /// The corners that were welded to others.
+    pub welded: Option<Seam>,
     /// Triangles without area that were removed.
     pub zero_area: usize,
     /// Repeated triangles that were removed.
@@ -74,14 +83,44 @@ pub struct Mended {
     pub turned: usize,
 }
 
-/// The mesh without faces that have no area or repeat an earlier one, and with faces turned so that neighbours agree and
+impl std::fmt::Display for Mended {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if let Some(seam) = self.welded {
+            let Seam { within, share, corners, .. } = seam;
+            write!(f, "{corners} corners welded to others within {within:.1e} units ({share:.0e} of its size), ")?;
+        }
+        let Self { zero_area, duplicates, turned, .. } = self;
+        write!(f, "{zero_area} triangles without area and {duplicates} repeated ones removed, {turned} turned")
+    }
+}
+
+/// The mesh with rims that lie along each other welded (see [`Seam`]), without faces that have no area or repeat an earlier one, and with faces turned so that neighbours agree and
 /// closed parts look outwards. Parts are joined at edges of two faces. A closed part inside the box of another one is a
 /// cavity and keeps the direction that most of its faces have, as do parts with a rim. Holes stay open.
 pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
     let point = |i: u32| mesh.positions[i as usize];
-    let welded = welded(mesh.positions.len(), point);
-    let faces = Faces::new(&mesh.triangles, &welded, &point);
+    let mut first_at = welded(mesh.positions.len(), point);
+    let mut faces = Faces::new(&mesh.triangles, &first_at, &point);
+    let open: Vec<[u32; 2]> = faces
+        .edges()
+        .chunk_by(|a, b| a.0 >> 1 == b.0 >> 1)
+        .filter(|uses| uses.len() == 1)
+        .map(|uses| ends(&uses[0]))
+        .collect();
+    let seam = faces.seam(&open, &point);
+    let mut moves = HashMap::new();
+    if let Some((_, moved)) = &seam {
+        for (i, first) in (0_u32..).zip(&mut first_at) {
+            *first = moved_to(moved, *first);
+            // Corners at one place keep their own numbers; those that move take the other's.
+            if point(i) != point(*first) {
+                moves.insert(i, *first);
+            }
+        }
+        faces = Faces::new(&mesh.triangles, &first_at, &point);
+    }
     let mut done = Mended {
+        welded: seam.map(|(seam, _)| seam),
         zero_area: faces.zero_area,
         duplicates: mesh.triangles.len() - faces.zero_area - faces.kept.len(),
         turned: 0,
@@ -89,13 +128,14 @@ pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
     let turn = faces.turned(&point);
     done.turned = turn.iter().filter(|&&t| t).count();
     let pick = |t: u32, triple: [u32; 3]| if turn[t as usize] { [triple[0], triple[2], triple[1]] } else { triple };
-    let triangles = faces.kept.iter().map(|&t| pick(t, mesh.triangles[t as usize])).collect();
+    let triangles =
+        faces.kept.iter().map(|&t| pick(t, mesh.triangles[t as usize].map(|i| moved_to(&moves, i)))).collect();
     let normals = mesh.normals.map(|mut normals| {
         normals.triangles =
             faces.kept.iter().map(|&t| normals.triangles[t as usize].map(|triple| pick(t, triple))).collect();
         normals
     });
-    (ObjMesh { positions: mesh.positions, triangles, normals, ignored: mesh.ignored }, done)
+    (ObjMesh { triangles, normals, ..mesh }, done)
 }
 
 /// For each vertex the first one at the same place.
@@ -128,6 +168,11 @@ struct Faces {
 
 /// Lower corner, higher corner and direction in one number, and the triangle: edges with the same corners sort together.
 type Edge = (u64, u32);
+
+/// The two corners of an edge.
+fn ends(edge: &Edge) -> [u32; 2] {
+    [(edge.0 >> 32) as u32, (edge.0 as u32) >> 1]
+}
 
 impl Faces {
     fn new(triangles: &[[u32; 3]], welded: &[u32], point: &impl Fn(u32) -> DVec3) -> Self {
@@ -166,6 +211,21 @@ impl Faces {
         }
         edges.par_sort_unstable();
         edges
+    }
+
+    /// What welding the `open` edges would close.
+    fn seam(&self, open: &[[u32; 2]], point: &impl Fn(u32) -> DVec3) -> Option<(Seam, HashMap<u32, u32>)> {
+        let kept = || self.kept.iter().map(|&t| self.corners[t as usize]);
+        let first = point(*open.first()?.first()?);
+        let corners = kept().flatten().map(point);
+        let (lo, hi) = corners.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
+        let collapses = |moved: &HashMap<u32, u32>| {
+            kept().any(|t| {
+                let [a, b, c] = t.map(|corner| moved_to(moved, corner));
+                a == b || b == c || c == a
+            })
+        };
+        seam(open, collapses, point, (hi - lo).length())
     }
 
     /// For each triangle whether its face has to be turned.
@@ -294,7 +354,7 @@ mod tests {
         assert_eq!((found.zero_area, found.duplicates), (1, 3));
         assert!(found.mixed_edges >= 3 && found.volume.is_none() && found.open_edges == 0);
         let (mended, done) = mended(mesh);
-        assert_eq!((done, mended.triangles), (Mended { zero_area: 1, duplicates: 3, turned: 3 }, all));
+        assert_eq!((done, mended.triangles), (Mended { zero_area: 1, duplicates: 3, turned: 3, welded: None }, all));
     }
 
     #[test]
@@ -333,6 +393,55 @@ mod tests {
         assert_eq!(mended(hollow).1, Mended::default());
         let both_out = joined(ball(2.0).flipped(), &ball(1.0).flipped());
         assert_eq!(mended(both_out).1.turned, 168, "the outer one alone");
+    }
+
+    /// A soup whose corners were rounded apart: recognised, welded on request, and then the body it was.
+    #[test]
+    fn a_soup_of_nearly_equal_corners_is_welded() {
+        let mesh = ball(2.0);
+        for (apart, share) in [(1e-6, 1e-6), (1e-5, 1e-5), (1e-4, 1e-4)] {
+            let corner = |(k, &i): (usize, &u32)| {
+                let turn = (k % 7) as f64 - 3.0;
+                mesh.positions[i as usize] + DVec3::new(turn, -turn, 0.5 * turn) * (0.2 * apart)
+            };
+            let mut soup = ObjMesh {
+                positions: mesh.triangles.iter().flatten().enumerate().map(corner).collect(),
+                triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+                ..ObjMesh::default()
+            };
+            let found = seen(&soup);
+            let seam = found.seam.unwrap_or_else(|| panic!("{apart}: {found:?}"));
+            assert_eq!((seam.share, seam.closed), (share, found.open_edges), "{apart}");
+            assert!(found.open_edges > 400 && found.can_be_mended());
+            let (whole, done) = mended(soup.clone());
+            assert_eq!(done, Mended { welded: done.welded, ..Mended::default() });
+            assert!(done.to_string().contains("corners welded to others within"), "{done}");
+            let left = seen(&whole);
+            assert_eq!((left.open_edges, left.triangles, left.seam), (0, 168, None), "{apart}");
+            assert!((left.volume.unwrap() / seen(&mesh).volume.unwrap() - 1.0).abs() < 1e-3);
+            // A hole stays one.
+            soup.triangles.truncate(150);
+            let (open, _) = mended(soup);
+            assert!(seen(&open).open_edges > 0 && seen(&open).seam.is_none());
+        }
+    }
+
+    #[test]
+    fn rims_that_lie_apart_or_belong_to_small_triangles_are_no_seam() {
+        let mut mesh = ball(2.0);
+        mesh.normals = None;
+        mesh.triangles.remove(20);
+        assert_eq!(seen(&mesh).seam, None);
+        // Two sheets 1 % of their size apart.
+        let sheet = |z: f64| super::super::rectangle(DVec3::new(0.0, 0.0, z), DVec3::X, DVec3::Y);
+        assert_eq!(seen(&joined(sheet(0.0), &sheet(0.02))).seam, None);
+        // A rim of edges shorter than the distances tried.
+        let n = 1000_u32;
+        let mut fan = ObjMesh { positions: vec![DVec3::ZERO], ..ObjMesh::default() };
+        let at = |i: u32| (f64::from(i) * 1e-5).sin_cos();
+        fan.positions.extend((0..=n).map(|i| DVec3::new(at(i).1, at(i).0, 0.0)));
+        fan.triangles = (1..=n).map(|i| [0, i, i + 1]).collect();
+        assert_eq!(seen(&fan).seam, None);
     }
 
     #[test]

@@ -10,7 +10,11 @@ mod morton;
 mod obj;
 mod obj_lines;
 mod obj_mesh;
+mod obj_remarks;
+mod polygon;
+mod polygon_fill;
 mod shapes;
+mod weld;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
@@ -21,3 +25,4 @@ pub use morton::morton_code;
 pub use obj::{LOADING_BYTES, load_obj, write_obj};
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};
+pub use weld::Seam;

@@ -5,6 +5,8 @@ use std::io::{BufReader, Write};
 use std::path::Path;
 
 use super::obj_lines::ObjLines;
+use super::obj_remarks::OddPolygons;
+use super::polygon::triangulate;
 use super::{ObjMesh, ObjNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
@@ -13,14 +15,13 @@ use crate::math::DVec3;
 pub const LOADING_BYTES: usize = 220;
 
 /// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
-/// left out. A polygon becomes the fan of triangles about its first corner, which is right for convex polygons and
-/// covers too much for concave ones: triangulate those in the modelling program. Texture coordinates, vertex colours,
-/// materials, smoothing groups and curves are not read; a missing MTL file is no error. Points and lines are counted
-/// in [`ObjMesh::ignored`]. A face has the file's normals only where all its corners have one.
+/// left out. Polygons are cut into triangles, concave ones and those with a hole too. Texture coordinates, vertex colours,
+/// weights, materials, smoothing groups and curves are not read; a missing MTL file is no error. What a user should hear of
+/// is in [`ObjMesh::remarks`]. A face has the file's normals only where all its corners have one.
 ///
 /// # Errors
 /// A file error if `path` cannot be read. A scene error that names path and line if a vertex is not finite or not a
-/// number, an index is 0 or of a vertex that does not exist, or a line is longer than 1 MiB; one that names the path
+/// number, an index is 0 or of a vertex that does not exist, or a line is longer than 16 MiB; one that names the path
 /// if there are no faces. A Memory error, found while reading, if the mesh is more than what is available.
 pub fn load_obj(path: &Path) -> Result<ObjMesh> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
@@ -57,7 +58,7 @@ pub fn write_obj(mesh: &ObjMesh, out: &mut dyn Write) -> std::io::Result<()> {
 }
 
 fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<ObjMesh> {
-    let options = tobj::LoadOptions { triangulate: true, ..tobj::LoadOptions::default() };
+    let options = tobj::LoadOptions { triangulate: false, ..tobj::LoadOptions::default() };
     let loaded = tobj::load_obj_buf(lines, &options, |_| Err(tobj::LoadError::OpenFileFailed));
     // What the reader of lines found first; tobj's own complaints carry no line.
     if let Some(cause) = lines.failed_read() {
@@ -77,14 +78,12 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
         return Err(at(line, &what));
     }
     let (models, _) = loaded.map_err(|e| at(lines.line(), &explain(e, lines.current())))?;
-    let mut out = ObjMesh { ignored: lines.ignored(), ..ObjMesh::default() };
-    // The reader of lines drops `o`, `g` and `usemtl`, so there is one model.
-    for model in models {
-        let (base, mesh) = (out.positions.len() as u32, model.mesh);
-        out.positions.extend(mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0], p[1], p[2])));
-        out.triangles.extend(mesh.indices.chunks_exact(3).map(|t| [base + t[0], base + t[1], base + t[2]]));
-        out.normals = normals(&mesh, lines.has_normals());
+    let mut out = ObjMesh::default();
+    // The reader of lines drops `o`, `g` and `usemtl`, so there is at most one model.
+    if let Some(model) = models.into_iter().next() {
+        out = cut(&model.mesh, lines);
     }
+    out.remarks.splice(0..0, lines.remarks());
     if out.triangles.is_empty() {
         return Err(Error::scene(format!(
             "{}: no faces: {}; export the surface as polygons (`v` and `f` lines)",
@@ -94,44 +93,56 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
             } else if lines.vertices() == 0 {
                 "and no vertices either; is it an OBJ file?".into()
             } else {
-                format!("{} vertices, {} points and lines", lines.vertices(), out.ignored)
+                format!("{} vertices, {} points and lines", lines.vertices(), lines.ignored())
             }
-        )));
-    }
-    // A vertex divided by its weight may overflow; the reader of lines saw only what was typed.
-    if let Some(p) = out.positions.iter().find(|p| !p.is_finite()) {
-        return Err(Error::scene(format!(
-            "{}: a vertex divided by its weight is not finite ({p}); remove the fourth number of `v`",
-            path.display()
         )));
     }
     Ok(out)
 }
 
-/// The normals of the triangles that have them. tobj makes up an index where a corner has none: `has` says where.
-fn normals(mesh: &tobj::Mesh, has: &[bool]) -> Option<ObjNormals> {
-    if !has.contains(&true) {
-        return None;
+/// The triangles of the faces, with the normals of those that have them.
+fn cut<R: std::io::BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> ObjMesh {
+    let mut out = ObjMesh {
+        positions: mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0], p[1], p[2])).collect(),
+        normals: vectors(mesh, lines.has_normals()).map(|vectors| ObjNormals { vectors, triangles: Vec::new() }),
+        ..ObjMesh::default()
+    };
+    let mut polygon_lines = lines.polygon_lines().iter();
+    let (mut corners, mut triangles, mut odd) = (Vec::new(), Vec::new(), OddPolygons::default());
+    let mut start = 0;
+    for (face, &has_normals) in lines.has_normals().iter().enumerate() {
+        // Without arities all faces are triangles.
+        let arity = mesh.face_arities.get(face).map_or(3, |&n| n as usize);
+        let of = |indices: &[u32], t: [u32; 3]| t.map(|i| indices[start + i as usize]);
+        triangles.clear();
+        if arity == 3 {
+            triangles.push([0, 1, 2]);
+        } else {
+            corners.clear();
+            corners.extend(mesh.indices[start..start + arity].iter().map(|&i| out.positions[i as usize]));
+            let shape = triangulate(&corners, &mut triangles);
+            odd.count(shape, polygon_lines.next().copied().unwrap_or(0));
+        }
+        out.triangles.extend(triangles.iter().map(|&t| of(&mesh.indices, t)));
+        if let Some(normals) = &mut out.normals {
+            let usable = |t: &[u32; 3]| has_normals && t.iter().all(|&i| normals.vectors[i as usize] != DVec3::ZERO);
+            // tobj makes up an index where a corner has none.
+            normals.triangles.extend(triangles.iter().map(|&t| Some(of(&mesh.normal_indices, t)).filter(usable)));
+        }
+        start += arity;
     }
-    let vectors: Vec<DVec3> = mesh
-        .normals
-        .chunks_exact(3)
-        .map(|n| {
-            let n = DVec3::new(n[0], n[1], n[2]);
-            // Divided by its largest component first, so that no length overflows or vanishes.
-            (n / n.abs().max_element()).normalize_or_zero()
-        })
-        .collect();
-    let triangles = mesh
-        .normal_indices
-        .chunks_exact(3)
-        .zip(has)
-        .map(|(t, &has)| {
-            let usable = has && t.iter().all(|&i| vectors[i as usize] != DVec3::ZERO);
-            usable.then(|| [t[0], t[1], t[2]])
-        })
-        .collect();
-    Some(ObjNormals { vectors, triangles })
+    out.remarks = odd.remarks().collect();
+    out
+}
+
+/// The file's normals, if any face has them; 0 stands for one without a direction.
+fn vectors(mesh: &tobj::Mesh, has: &[bool]) -> Option<Vec<DVec3>> {
+    let unit = |n: &[f64]| {
+        let n = DVec3::new(n[0], n[1], n[2]);
+        // Divided by its largest component first, so that no length overflows or vanishes.
+        (n / n.abs().max_element()).normalize_or_zero()
+    };
+    has.contains(&true).then(|| mesh.normals.chunks_exact(3).map(unit).collect())
 }
 
 /// tobj's complaint in words that say what to mend.
@@ -139,8 +150,6 @@ fn explain(error: tobj::LoadError, line: &str) -> String {
     use tobj::LoadError as E;
     let (what, remedy) = match error {
         E::PositionParseError => ("no vertex", "expected `v x y z`, three numbers with decimal points"),
-        E::ScalingByZeroError => ("a vertex of weight 0", "expected `v x y z`, or a fourth number other than 0"),
-        E::ColorParseError => ("no vertex", "expected three, four or six numbers after `v`"),
         E::NormalParseError => ("no normal", "expected `vn x y z`, three numbers with decimal points"),
         E::FaceParseError | E::InvalidPolygon => ("no face", "expected `f` and at least three vertex numbers"),
         E::FaceVertexOutOfBounds | E::FaceNormalOutOfBounds => ("a face of vertices that do not exist", "export again"),

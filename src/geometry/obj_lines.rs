@@ -1,11 +1,12 @@
 //! The lines of an OBJ file on their way to `tobj`: counted, so that a complaint can name one, and reduced to what we
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
+use super::obj_remarks::{CURVED, KNOWN, OddLines};
 use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
 
-/// Longer than any real line; keeps a binary file from being read as one.
-const MAX_LINE: usize = 1 << 20;
+/// Longer than any real line, polygons of a million corners included; keeps a binary file from being read as one.
+const MAX_LINE: usize = 1 << 24;
 
 /// This many vertices, normals or triangles are refused, so that indices stay below 2^32.
 const MAX_COUNT: usize = 1 << 31;
@@ -18,12 +19,18 @@ pub(super) struct ObjLines<R> {
     taken: usize,
     /// Number of the last line read, from 1.
     line: usize,
+    /// The last line ended in a carriage return: a line feed after it is no line of its own.
+    after_return: bool,
     vertices: usize,
     normals: usize,
+    /// Of all faces, cut into triangles.
+    triangles: usize,
     /// Largest positive index that had no vertex or normal yet, with its line: a file may define them later.
     forward: [Option<(usize, usize)>; 2],
     has_normals: Vec<bool>,
+    polygon_lines: Vec<usize>,
     ignored: usize,
+    odd: OddLines,
     complaint: Option<(usize, String)>,
     failed: Option<io::Error>,
     /// Entries at which memory is looked at next.
@@ -48,11 +55,15 @@ impl<R: BufRead> ObjLines<R> {
             out: String::new(),
             taken: 0,
             line: 0,
+            after_return: false,
             vertices: 0,
             normals: 0,
+            triangles: 0,
             forward: [None; 2],
             has_normals: Vec::new(),
+            polygon_lines: Vec::new(),
             ignored: 0,
+            odd: OddLines::default(),
             complaint: None,
             failed: None,
             look_at: 1 << 20,
@@ -79,9 +90,20 @@ impl<R: BufRead> ObjLines<R> {
         self.ignored
     }
 
-    /// For each triangle of the fans, whether all corners of its face had a normal.
+    /// For each face, whether all its corners had a normal.
     pub(super) fn has_normals(&self) -> &[bool] {
         &self.has_normals
+    }
+
+    /// The lines of the faces with more than three corners.
+    pub(super) fn polygon_lines(&self) -> &[usize] {
+        &self.polygon_lines
+    }
+
+    /// What a user should hear of who expects the file to be shown as it is.
+    pub(super) fn remarks(&self) -> impl Iterator<Item = String> {
+        let unused = if self.has_normals.contains(&true) { 0 } else { self.normals };
+        self.odd.remarks(self.ignored, unused)
     }
 
     /// That the mesh is more than what is available, if it is.
@@ -121,24 +143,59 @@ impl<R: BufRead> ObjLines<R> {
         })
     }
 
-    /// One line of the source into `raw`, `\` at its end joining the next; false at the end of the file.
+    /// The bytes up to the next line end, which may be a line feed, a carriage return or both, added to `raw`; false at
+    /// the end of the file.
+    fn read_to_line_end(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
+        let mut any = false;
+        loop {
+            let buffer = match self.source.fill_buf() {
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => continue,
+                buffer => buffer?,
+            };
+            let Some(first) = buffer.first() else {
+                self.line += usize::from(any);
+                return Ok(any);
+            };
+            if std::mem::take(&mut self.after_return) && *first == b'\n' {
+                self.source.consume(1);
+                continue;
+            }
+            any = true;
+            let end = buffer.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let taken = end.unwrap_or(buffer.len()).min(MAX_LINE + 1 - raw.len());
+            raw.extend_from_slice(&buffer[..taken]);
+            if raw.len() > MAX_LINE {
+                self.line += 1;
+                self.complaint = Some((self.line, "a line of more than 16 MiB; is it an OBJ file?".into()));
+                return Ok(false);
+            }
+            self.after_return = end.is_some_and(|end| buffer[end] == b'\r');
+            self.source.consume(taken + usize::from(end.is_some()));
+            if end.is_some() {
+                self.line += 1;
+                return Ok(true);
+            }
+        }
+    }
+
+    /// One line of the source into `raw`, `\` at its end joining the next; false at the end of the file. A comment ends
+    /// with its line: the paths in them may end in `\`.
     fn read_line(&mut self, raw: &mut Vec<u8>) -> io::Result<bool> {
         raw.clear();
         loop {
             let start = raw.len();
-            let read = (&mut self.source).take((MAX_LINE - start) as u64 + 1).read_until(b'\n', raw)?;
-            if read == 0 {
-                return Ok(start > 0);
+            if !self.read_to_line_end(raw)? {
+                return Ok(start > 0 && self.complaint.is_none());
             }
-            self.line += 1;
-            if raw.len() > MAX_LINE {
-                self.complaint = Some((self.line, "a line of more than 1 MiB; is it an OBJ file?".into()));
+            if self.line == 1 && is_utf_16(raw) {
+                let what = "the file is UTF-16 text; save it as UTF-8 or plain ASCII";
+                self.complaint = Some((1, what.into()));
                 return Ok(false);
             }
             while raw.last().is_some_and(u8::is_ascii_whitespace) {
                 raw.pop();
             }
-            if raw.last() != Some(&b'\\') {
+            if raw.last() != Some(&b'\\') || raw.trim_ascii_start().starts_with(b"#") {
                 return Ok(true);
             }
             raw.pop();
@@ -158,11 +215,13 @@ impl<R: BufRead> ObjLines<R> {
             let keyword = words.split(u8::is_ascii_whitespace).next().unwrap_or_default();
             match keyword {
                 b"l" | b"p" => self.ignored += 1,
-                b"v" | b"vn" | b"f" => {
+                // `fo` is the face of version 2.
+                b"v" | b"vn" | b"f" | b"fo" => {
                     // Anything but UTF-8 is no number; the replacement character makes tobj say so.
-                    let text = String::from_utf8_lossy(words).into_owned();
-                    let checked = if keyword == b"f" { self.face(&text) } else { self.vector(&text, keyword == b"v") };
-                    let count = self.vertices.max(self.normals).max(self.has_normals.len());
+                    let text = String::from_utf8_lossy(words);
+                    let checked =
+                        if keyword[0] == b'f' { self.face(&text) } else { self.vector(&text, keyword == b"v") };
+                    let count = self.vertices.max(self.normals).max(self.triangles);
                     let fits =
                         || if count < MAX_COUNT { Ok(()) } else { Err("2^31 entries; split the mesh".to_string()) };
                     if let Err(what) = checked.and_then(|()| fits()) {
@@ -175,15 +234,28 @@ impl<R: BufRead> ObjLines<R> {
                         return Ok(());
                     }
                 }
-                _ => {}
+                b"" => {}
+                _ if keyword[0] == b'#' => {}
+                _ => {
+                    let (is, line) = (|words: &[&str]| words.iter().any(|w| w.as_bytes() == keyword), self.line);
+                    let word = || shown(&String::from_utf8_lossy(keyword));
+                    if is(CURVED) {
+                        self.odd.curved.count(word, line);
+                    } else if !is(KNOWN) {
+                        self.odd.unknown.count(word, line);
+                    }
+                }
             }
         }
         Ok(())
     }
 
-    /// A vertex or normal: finite, without colours.
+    /// A vertex or normal: finite, its three numbers alone.
     fn vector(&mut self, text: &str, is_vertex: bool) -> Result<(), String> {
-        for word in text.split_whitespace().skip(1).take(3) {
+        // A comment, but not the end of `1.#IND`, as an old compiler writes what is no number.
+        let comment = text.match_indices('#').find(|(at, _)| !text[..*at].ends_with('.'));
+        let words = || text[..comment.map_or(text.len(), |(at, _)| at)].split_whitespace();
+        for word in words().skip(1).take(3) {
             let lower = word.trim_start_matches(['-', '+']).to_ascii_lowercase();
             let named = lower.starts_with("nan") || lower.starts_with("inf") || lower.contains('#');
             if named || word.parse::<f64>().is_ok_and(|v| !v.is_finite()) {
@@ -193,12 +265,18 @@ impl<R: BufRead> ObjLines<R> {
         }
         if is_vertex {
             self.vertices += 1;
+            // x y z r g b, as scanners write it, is common and says nothing about the shape.
+            let further = words().skip(4).map(str::parse::<f64>).collect::<Result<Vec<_>, _>>();
+            match further.map_err(|_| format!("no vertex in `{}`; expected numbers after `v`", shown(text)))?[..] {
+                [] | [_, _, _] => {}
+                [1.0] => {}
+                [weight] => self.odd.weighted.count(|| weight, self.line),
+                ref further => self.odd.further.count(|| further.len(), self.line),
+            }
         } else {
             self.normals += 1;
         }
-        // x y z r g b, as scanners write it; six numbers or more.
-        let keep = if is_vertex && text.split_whitespace().nth(6).is_some() { 4 } else { usize::MAX };
-        for word in text.split_whitespace().take(keep) {
+        for word in words().take(4) {
             self.out.push_str(word);
             self.out.push(' ');
         }
@@ -210,7 +288,8 @@ impl<R: BufRead> ObjLines<R> {
     fn face(&mut self, text: &str) -> Result<(), String> {
         let malformed =
             || format!("no face in `{}`; expected `f` and vertex numbers v, v/vt, v//vn or v/vt/vn", shown(text));
-        let corners = text.split_whitespace().skip(1).map(|word| {
+        let before_comment = text.split('#').next().unwrap_or_default();
+        let corners = before_comment.split_whitespace().skip(1).map(|word| {
             let mut parts = word.split('/');
             let mut part = || match parts.next() {
                 None | Some("") => Ok(None),
@@ -245,7 +324,14 @@ impl<R: BufRead> ObjLines<R> {
         }
         out.push('\n');
         self.out = out;
-        self.has_normals.resize(self.has_normals.len() + corners.len() - 2, with_normals);
+        self.triangles += corners.len() - 2;
+        self.has_normals.push(with_normals);
+        if !with_normals && corners.iter().any(|(_, vn)| vn.is_some()) {
+            self.odd.half_shaded.count(|| (), self.line);
+        }
+        if corners.len() > 3 {
+            self.polygon_lines.push(self.line);
+        }
         Ok(())
     }
 
@@ -261,6 +347,15 @@ impl<R: BufRead> ObjLines<R> {
             self.forward[kind] = Some((index, self.line));
         }
         Ok(index)
+    }
+}
+
+/// By its mark, or by the zero bytes that letters and blanks have in it.
+fn is_utf_16(line: &[u8]) -> bool {
+    match line {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] => true,
+        [a, 0, b, 0, ..] | [0, a, 0, b, ..] => *a != 0 && *b != 0,
+        _ => false,
     }
 }
 

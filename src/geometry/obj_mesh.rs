@@ -16,8 +16,8 @@ pub struct ObjMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Normals, where there are any.
     pub normals: Option<ObjNormals>,
-    /// Points, lines and faces with fewer than three corners that the file had besides.
-    pub ignored: usize,
+    /// What a user should hear of: what the file has besides, and what is odd about its polygons.
+    pub remarks: Vec<String>,
 }
 
 /// Normals with indices of their own; a triangle may be without.
@@ -77,16 +77,32 @@ impl ObjMesh {
         }
     }
 
+    /// For each vertex the first one at exactly the same position.
+    fn first_at(&self) -> Vec<u32> {
+        let mut first_at = HashMap::with_capacity(self.positions.len());
+        (0_u32..)
+            .zip(&self.positions)
+            // + 0.0 makes -0 and 0 one position.
+            .map(|(i, p)| *first_at.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert(i))
+            .collect()
+    }
+
+    /// Triangles whose corners are at positions of no other triangle.
+    pub fn sharing_no_corner(&self) -> usize {
+        let first_at = self.first_at();
+        let mut uses = vec![0_u32; self.positions.len()];
+        let corners = |t: &[u32; 3]| t.map(|i| first_at[i as usize] as usize);
+        for corner in self.triangles.iter().flat_map(corners) {
+            uses[corner] = uses[corner].saturating_add(1);
+        }
+        self.triangles.iter().filter(|t| corners(t).iter().all(|&corner| uses[corner] == 1)).count()
+    }
+
     /// Normals computed anew: at each position the mean of the normals of the triangles around it, weighted by their
     /// angles there. Vertices at exactly the same position count as one.
     #[must_use]
     pub fn with_smooth_normals(mut self) -> Self {
-        let mut first_at = HashMap::with_capacity(self.positions.len());
-        let welded: Vec<u32> = (0_u32..)
-            .zip(&self.positions)
-            // + 0.0 makes -0 and 0 one position.
-            .map(|(i, p)| *first_at.entry(p.to_array().map(|x| (x + 0.0).to_bits())).or_insert(i))
-            .collect();
+        let welded = self.first_at();
         let mut vectors = vec![DVec3::ZERO; self.positions.len()];
         for t in &self.triangles {
             let p = t.map(|i| self.positions[i as usize]);

@@ -1,6 +1,7 @@
 //! What is wrong with the objects' meshes, and what marmor does about it.
 
 use super::{Object, Surface};
+use crate::geometry::Seam;
 
 /// A finding about an object's mesh, in words.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -53,16 +54,26 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
         };
         say(one_sided, format!("its faces look inwards (volume {volume:.4e} unit³): {effect}"));
     }
-    if found.open_edges > 0 {
+    if let Some(seam) = found.seam {
+        let Seam { within, share, corners, closed } = seam;
+        let effect = if translucent { "so the body is not closed" } else { "harmless: nothing is inside" };
+        say(
+            translucent,
+            format!(
+                "{closed} of {} edges that belong to one triangle alone run along another such edge within {within:.1e} units \
+                 ({share:.0e} of its size): {corners} corners that should be one with others are not, {effect}; --repair welds them",
+                found.open_edges
+            ),
+        );
+    }
+    let holes = found.open_edges - found.seam.map_or(0, |seam| seam.closed);
+    if holes > 0 {
         let effect = if translucent {
             "the surface is rendered as it is, as if the medium ended at the rim; close the holes for a solid body"
         } else {
             "harmless: nothing is inside"
         };
-        say(
-            translucent,
-            format!("{} edges belong to one triangle alone, the rims of holes: {effect}", found.open_edges),
-        );
+        say(translucent, format!("{holes} edges belong to one triangle alone, the rims of holes: {effect}"));
     }
     if found.non_manifold_edges > 0 {
         say(

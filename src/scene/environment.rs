@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::file::{RADIANCE, colour, rgb};
 use super::tree::Fields;
 use crate::error::{Error, Result};
-use crate::film::Image;
+use crate::film::{FilePicture, Image};
 use crate::math::Rgb;
 
 /// `[environment]`.
@@ -14,8 +14,10 @@ use crate::math::Rgb;
 pub struct EnvironmentEntry {
     /// Radiance, or what the picture's is multiplied by; black without the section.
     pub radiance: Rgb,
-    /// An EXR of all directions, looked for beside the scene file.
+    /// An EXR or Radiance HDR file of all directions, looked for beside the scene file.
     pub image: Option<PathBuf>,
+    /// The layer of an EXR file that has several.
+    pub layer: Option<String>,
     /// Turns the picture about the y axis [degrees], counterclockwise as seen from above.
     pub turn: f64,
 }
@@ -48,8 +50,9 @@ impl From<Rgb> for Environment {
 
 pub(super) fn read(top: &Fields<'_>) -> Result<EnvironmentEntry> {
     let Some(e) = top.table("environment")? else { return Ok(EnvironmentEntry::default()) };
-    e.only("[environment]", &["radiance", "image", "turn"])?;
-    let image: Option<PathBuf> = e.get("image", "the name of an EXR file", super::tree::Node::text)?.map(PathBuf::from);
+    e.only("[environment]", &["radiance", "image", "layer", "turn"])?;
+    let image: Option<PathBuf> =
+        e.get("image", "the name of an EXR or HDR file", super::tree::Node::text)?.map(PathBuf::from);
     let radiance = e.get("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0))?.map(rgb);
     Ok(EnvironmentEntry {
         radiance: match (radiance, &image) {
@@ -58,6 +61,7 @@ pub(super) fn read(top: &Fields<'_>) -> Result<EnvironmentEntry> {
             (None, None) => return Err(e.missing("radiance", RADIANCE)),
         },
         image,
+        layer: e.get("layer", "the name of a layer", super::tree::Node::text)?.map(String::from),
         turn: e.get("turn", "degrees from -360 to 360", |n| n.number().filter(|d| d.abs() <= 360.0))?.unwrap_or(0.0),
     })
 }
@@ -69,7 +73,13 @@ impl EnvironmentEntry {
         let Some(path) = self.image.as_ref().map(|name| folder.join(name)) else {
             return Ok(Environment { radiance: self.radiance, image: None, turn });
         };
-        let mut image = Image::read_exr(&path).map_err(|e| e.within("[environment]"))?;
+        let read = FilePicture::read(&path, self.layer.as_deref()).map_err(|e| e.within("[environment]"))?;
+        if read.cube {
+            let why = "it holds the six sides of a cube; an environment needs longitude and latitude";
+            return Err(Error::file(&path, "use", why).within("[environment]"));
+        }
+        said.extend(read.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
+        let mut image = read.image;
         if image.window.area() != image.resolution.iter().map(|&n| n as usize).product::<usize>() {
             let why = "its data window leaves out part of the picture; an environment needs all directions";
             return Err(Error::file(&path, "use", why));
@@ -81,15 +91,23 @@ impl EnvironmentEntry {
                 path.display()
             ));
         }
-        let mut dropped = 0_u64;
+        let (mut negative, mut nan, mut infinite) = (0_u64, 0_u64, 0_u64);
         for value in image.pixels.iter_mut().flat_map(|p| &mut p.0) {
-            if !(value.is_finite() && *value >= 0.0) {
-                (*value, dropped) = (0.0, dropped + 1);
-            }
+            let count = match *value {
+                v if v.is_nan() => &mut nan,
+                v if v < 0.0 => &mut negative,
+                v if v.is_infinite() => &mut infinite,
+                _ => continue,
+            };
+            (*count, *value) = (*count + 1, 0.0);
         }
+        let dropped = negative + nan + infinite;
         if dropped > 0 {
-            let what = "values are negative or not finite and count as 0";
-            said.push(format!("{}: {dropped} {what}", path.display()));
+            said.push(format!(
+                "{}: {dropped} values are negative or not finite ({negative} negative, {nan} not a number, {infinite} infinite) and \
+                 count as 0",
+                path.display()
+            ));
         }
         Ok(Environment { radiance: self.radiance, image: Some(Arc::new(image)), turn })
     }

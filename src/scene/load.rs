@@ -115,13 +115,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                     None => {
                         let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
                         let mesh = Rc::new(load_obj(&path).map_err(within)?);
-                        if mesh.ignored > 0 {
-                            said.push(format!(
-                                "{}: {} points, lines or faces with fewer than three corners are left out",
-                                path.display(),
-                                mesh.ignored
-                            ));
-                        }
+                        said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
                         read.insert(path, Rc::clone(&mesh));
                         mesh
                     }
@@ -153,14 +147,22 @@ fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<St
         let done;
         (mesh, done) = mended(mesh);
         if done != Mended::default() {
-            said.push(format!(
-                "{}: object {:?} mended: {} triangles without area and {} repeated ones removed, {} turned",
-                entry.at, entry.name, done.zero_area, done.duplicates, done.turned
-            ));
+            said.push(format!("{}: object {:?} mended: {done}", entry.at, entry.name));
         }
     }
     // After the transform: a stretch changes the angles.
-    if entry.normals == NormalsChoice::Smooth { mesh.with_smooth_normals() } else { mesh }
+    if entry.normals != NormalsChoice::Smooth {
+        return mesh;
+    }
+    let (alone, all) = (mesh.sharing_no_corner(), mesh.triangles.len());
+    if all > 1 && 2 * alone > all {
+        said.push(format!(
+            "{}: object {:?}: normals = \"smooth\" smooths nothing on {alone} of {all} triangles, which share no corner with \
+             another, so they are shaded flat; weld corners that should be one: --repair does where they lie close together",
+            entry.at, entry.name
+        ));
+    }
+    mesh.with_smooth_normals()
 }
 
 /// Middle of the box around all meshes; halved before it is added, so that it cannot overflow.

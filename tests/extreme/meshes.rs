@@ -68,6 +68,139 @@ fn needles_ok() {
     shots_of(&body(&closed).unwrap());
 }
 
+/// Twice the outline of an X as one polygon each, and its sides.
+fn extruded_x() -> String {
+    #[rustfmt::skip]
+    let outline = [
+        (-5, 9), (-9, 9), (-9, 5), (-3, 0), (-9, -5), (-9, -9), (-5, -9), (0, -3), (5, -9), (9, -9), (9, -5), (3, 0), (9, 5),
+        (9, 9), (5, 9), (0, 3),
+    ];
+    let mut obj = String::new();
+    for z in [0.15, -0.15] {
+        outline.iter().for_each(|(x, y)| obj += &format!("v {} {} {z}\n", f64::from(*x) / 10.0, f64::from(*y) / 10.0));
+    }
+    let ring = |corners: &mut dyn Iterator<Item = usize>| {
+        format!("f {}\n", corners.map(|i| i.to_string()).collect::<Vec<_>>().join(" "))
+    };
+    obj += &ring(&mut (1..=16));
+    obj += &ring(&mut (17..=32).rev());
+    (0..16).for_each(|i| obj += &format!("f {} {} {} {}\n", i + 1, i + 17, (i + 1) % 16 + 17, (i + 1) % 16 + 1));
+    obj
+}
+
+fn area(scene: &Scene) -> f64 {
+    let mesh = &scene.objects[0].mesh;
+    (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum()
+}
+
+#[test]
+fn concave_polygons_ok() {
+    let scene = body(&extruded_x()).unwrap();
+    // The outline's area is 2.04 and its length 9.44820, by its corners.
+    assert!((area(&scene) / 6.914_459_9 - 1.0).abs() < 1e-5, "{}", area(&scene));
+    let volume = scene.objects[0].findings.volume.unwrap();
+    assert!((volume / 0.612 - 1.0).abs() < 1e-5, "{volume}");
+    ok(&scene);
+}
+
+/// A plate with a square hole: caps with a bridge to the hole, as exporters write them.
+#[test]
+fn a_hole_bridged_by_a_repeated_edge_ok() {
+    let mut obj = String::new();
+    for (half, z) in [(0.8, 0.2), (0.3, 0.2), (0.8, -0.2), (0.3, -0.2)] {
+        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+            obj += &format!("v {} {} {z}\n", half * x, half * y);
+        }
+    }
+    obj += "f 1 2 3 4 1 5 8 7 6 5\nf 9 12 11 10 9 13 14 15 16 13\n";
+    for i in 0..4 {
+        let next = (i + 1) % 4;
+        obj += &format!("f {} {} {} {}\n", i + 1, i + 9, next + 9, next + 1);
+        obj += &format!("f {} {} {} {}\n", next + 5, next + 13, i + 13, i + 5);
+    }
+    let scene = body(&obj).unwrap();
+    // Two caps of 1.6^2 - 0.6^2, sides of 4 (1.6 + 0.6) by 0.4.
+    assert!((area(&scene) / 7.92 - 1.0).abs() < 1e-6, "{}", area(&scene));
+    assert_eq!(scene.objects[0].findings.open_edges, 0);
+    ok(&scene);
+}
+
+#[test]
+fn a_polygon_that_crosses_itself_warns() {
+    let bow = cube().replace("f 5 6 8 7\n", "f 5 6 7 8\n");
+    warns(&body(&bow).unwrap(), &["body.obj: 1 of 6 polygons cross or cover themselves (the first in line 10)"]);
+}
+
+#[test]
+fn a_polygon_that_is_not_plane_warns() {
+    let bent = cube().replace("v 0.8 0.8 0.8\n", "v 0.8 0.8 1.8\n");
+    warns(&body(&bent).unwrap(), &["body.obj: 1 of 6 polygons are not plane", "cut them into triangles"]);
+}
+
+/// A cube whose faces have corners of their own, rounded apart by a few millionths of its size.
+fn soup() -> String {
+    let (mut corners, mut obj) = (Vec::new(), String::new());
+    for line in cube().lines() {
+        let numbers: Vec<f64> = line.split(' ').skip(1).map(|n| n.parse().unwrap()).collect();
+        if line.starts_with('v') {
+            corners.push(numbers);
+            continue;
+        }
+        for (k, n) in numbers.iter().enumerate() {
+            let p: Vec<f64> = corners[*n as usize - 1].iter().map(|x| x + 3e-6 * (k as f64 - 1.5)).collect();
+            obj += &format!("v {} {} {}\n", p[0], p[1], p[2]);
+        }
+        obj += "f -4 -3 -2 -1\n";
+    }
+    obj
+}
+
+#[test]
+fn corners_rounded_apart_warns() {
+    let scene = body(&soup()).unwrap();
+    warns(&scene, &["24 of 24 edges that belong to one triangle alone run along another", "--repair welds them"]);
+    assert!(!scene.warnings.join("\n").contains("holes"));
+    let whole = mended(&soup());
+    let said = whole.warnings.join("\n");
+    assert!(said.contains("corners welded to others within 2.8e-5 units (1e-5 of its size)"), "{said}");
+    assert!(whole.objects[0].findings.volume.is_some_and(|v| (v / 4.096 - 1.0).abs() < 1e-4));
+}
+
+#[test]
+fn smooth_normals_without_shared_corners_warns() {
+    let apart: String = (0..6).map(|i| format!("v {i} 0 0\nv {i}.5 0 0\nv {i} 1 0\nf -3 -2 -1\n")).collect();
+    let text = with(&[(BALL, "mesh = \"body.obj\"\nnormals = \"smooth\"\nmaterial = \"wax\"")]);
+    let load = |obj: &str| load_with(&text, &[("body.obj", obj)], false).unwrap();
+    warns(&load(&apart), &["smooths nothing on 6 of 6 triangles, which share no corner", "--repair"]);
+    ok(&load(&cube()));
+}
+
+#[test]
+fn a_fourth_number_on_vertices_warns() {
+    let grey: String =
+        cube().lines().map(|l| if l.starts_with('v') { format!("{l} 0.8\n") } else { format!("{l}\n") }).collect();
+    let said = "body.obj: 8 vertices have a fourth number other than 1 (the first, 0.8, in line 1)";
+    let shots = warns(&body(&grey).unwrap(), &[said, "not divided"]);
+    same_pictures(&shots, &ok(&body(&cube()).unwrap()));
+}
+
+#[test]
+fn carriage_returns_alone_ok() {
+    same_pictures(&ok(&body(&cube().replace('\n', "\r")).unwrap()), &ok(&body(&cube()).unwrap()));
+}
+
+#[test]
+fn a_comment_after_a_face_ok() {
+    let commented = cube().replace("f 5 6 8 7", "f 5 6 8 7 # the front");
+    same_pictures(&ok(&body(&commented).unwrap()), &ok(&body(&cube()).unwrap()));
+}
+
+#[test]
+fn utf_16_refused() {
+    let wide: String = cube().chars().flat_map(|c| [c, '\0']).collect();
+    refused(body(&wide), &["body.obj:1", "UTF-16", "UTF-8"]);
+}
+
 #[test]
 fn duplicate_triangles_warns() {
     let broken = cube() + "f 1 3 4\nf 4 3 1\n";

@@ -1,0 +1,169 @@
+//! What is odd about the lines and the polygons of an OBJ file, in one sentence for each kind.
+
+use super::polygon::Shape;
+
+/// Lines that are read in part or not at all: how many, and the first.
+#[derive(Default)]
+pub(super) struct OddLines {
+    /// Free-form curves and surfaces.
+    pub curved: Seen<String>,
+    /// Lines whose first word is none of OBJ's.
+    pub unknown: Seen<String>,
+    /// Vertices with a fourth number other than 1.
+    pub weighted: Seen<f64>,
+    /// Vertices with numbers that are neither a weight nor colours.
+    pub further: Seen<usize>,
+    /// Faces with normals at some of their corners.
+    pub half_shaded: Seen<()>,
+}
+
+/// How often something was seen, and what and where first.
+pub(super) struct Seen<T> {
+    count: usize,
+    first: Option<(T, usize)>,
+}
+
+impl<T> Default for Seen<T> {
+    fn default() -> Self {
+        Self { count: 0, first: None }
+    }
+}
+
+impl<T> Seen<T> {
+    pub(super) fn count(&mut self, what: impl FnOnce() -> T, line: usize) {
+        self.count += 1;
+        self.first.get_or_insert_with(|| (what(), line));
+    }
+
+    /// A sentence of the number, what was first and its line.
+    fn say(&self, sentence: impl FnOnce(usize, &T, usize) -> String) -> Option<String> {
+        self.first.as_ref().map(|(what, line)| sentence(self.count, what, *line))
+    }
+}
+
+/// What OBJ has besides vertices, normals and faces, and that is not geometry.
+pub(super) const KNOWN: &[&str] = &[
+    "vt",
+    "vp",
+    "o",
+    "g",
+    "s",
+    "mg",
+    "usemtl",
+    "usemap",
+    "mtllib",
+    "maplib",
+    "cstype",
+    "deg",
+    "bmat",
+    "step",
+    "parm",
+    "trim",
+    "hole",
+    "scrv",
+    "sp",
+    "end",
+    "con",
+    "bevel",
+    "c_interp",
+    "d_interp",
+    "lod",
+    "shadow_obj",
+    "trace_obj",
+    "ctech",
+    "stech",
+    "call",
+    "csh",
+];
+
+/// Free-form geometry, the patches of version 2 included.
+pub(super) const CURVED: &[&str] = &["curv", "curv2", "surf", "bzp", "bsp", "cdc", "cdp", "res"];
+
+impl OddLines {
+    /// What there is to say; besides, points and lines were `ignored`, and `unused` normals belong to no face.
+    pub(super) fn remarks(&self, ignored: usize, unused: usize) -> impl Iterator<Item = String> {
+        [
+            (ignored > 0)
+                .then(|| format!("{ignored} points, lines or faces with fewer than three corners are left out")),
+            self.curved.say(|n, word, line| {
+                format!(
+                    "{n} free-form curves or surfaces are left out (the first, `{word}`, in line {line}): only polygons are \
+                     read; convert them in the modelling program"
+                )
+            }),
+            self.unknown.say(|n, word, line| {
+                format!("{n} lines begin with a word that OBJ does not have (the first, `{word}`, in line {line}) and are left out")
+            }),
+            self.weighted.say(|n, value, line| {
+                format!(
+                    "{n} vertices have a fourth number other than 1 (the first, {value}, in line {line}). It is the weight of \
+                     free-form curves and moves no corner of a polygon: vertices were not divided by their fourth number"
+                )
+            }),
+            self.further.say(|n, further, line| {
+                format!("{n} vertices have further numbers ({further} after x y z in line {line}), which are not read")
+            }),
+            self.half_shaded.say(|n, (), line| {
+                format!("{n} faces have normals at some corners only (the first in line {line}) and are shaded flat")
+            }),
+            (unused > 0 && self.half_shaded.count == 0)
+                .then(|| format!("no face refers to any of its {unused} normals: it is shaded flat; set `normals`")),
+        ]
+        .into_iter()
+        .flatten()
+    }
+}
+
+/// A polygon with corners farther off its plane than this share of its size, the root of its area, is said to be not
+/// plane: what lies between the corners is then a guess. A square folded along its diagonal by 30 degrees has 0.093, the
+/// quads of a modelled head 0.02 in the median.
+const BENT: f64 = 0.1;
+
+/// Polygons of a file that are odd, to be said in one sentence each.
+#[derive(Default)]
+pub(super) struct OddPolygons {
+    polygons: usize,
+    crossing: usize,
+    first_crossing: usize,
+    bent: usize,
+    most_bent: (f64, usize),
+}
+
+impl OddPolygons {
+    /// Counts a polygon that stands in `line`.
+    pub(super) fn count(&mut self, shape: Shape, line: usize) {
+        self.polygons += 1;
+        if shape.crosses {
+            self.crossing += 1;
+            if self.crossing == 1 {
+                self.first_crossing = line;
+            }
+        }
+        if shape.off_plane > BENT {
+            self.bent += 1;
+            if shape.off_plane > self.most_bent.0 {
+                self.most_bent = (shape.off_plane, line);
+            }
+        }
+    }
+
+    /// What there is to say.
+    pub(super) fn remarks(&self) -> impl Iterator<Item = String> {
+        let (all, remedy) = (self.polygons, "cut them into triangles in the modelling program");
+        let crossing = (self.crossing > 0).then(|| {
+            let (n, line) = (self.crossing, self.first_crossing);
+            format!(
+                "{n} of {all} polygons cross or cover themselves (the first in line {line}) and are filled wherever they wind \
+                 round a point; {remedy}"
+            )
+        });
+        let bent = (self.bent > 0).then(|| {
+            let (n, (off, line)) = (self.bent, self.most_bent);
+            format!(
+                "{n} of {all} polygons are not plane (corners up to {off:.2} of the polygon's size off its plane, in line {line}): \
+                 the surface between their corners is a guess; {remedy}"
+            )
+        });
+        crossing.into_iter().chain(bent)
+    }
+}
