@@ -15,7 +15,7 @@ fn a_report_has_its_page_plots_table_and_records() {
     let output = marmor(folder.path(), &arguments);
     let told = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{told}");
-    assert!(told.contains("the smallest error") && told.contains("index.html"), "{told}");
+    assert!(told.contains("At equal time (") && told.contains("index.html"), "{told}");
     let out = folder.path().join("out");
     let page = fs::read_to_string(out.join("index.html")).unwrap();
     assert!(page.len() < 2_000_000, "{}", page.len());
@@ -76,7 +76,48 @@ fn a_reference_may_be_given() {
     );
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert!(output.stderr.is_empty());
-    assert!(fs::read_to_string(folder.path().join("o/index.html")).unwrap().contains("r.exr, taken as exact"));
+    assert!(
+        fs::read_to_string(folder.path().join("o/index.html")).unwrap().contains("r.exr; its own noise is not known")
+    );
+}
+
+/// What the methods render is what the reference is: there is nothing to tell apart.
+#[test]
+fn a_reference_with_the_seed_of_a_method_is_no_reference() {
+    let folder = ball_under_sky();
+    assert!(marmor(folder.path(), &["render", "scene.toml", "-q", "-o", "r.film", "--spp", "16"]).status.success());
+    let arguments = ["converge", "scene.toml", "--methods", "all", "--reference", "r.film", "--time-budget", "20ms"];
+    let output = marmor(folder.path(), &[&arguments[..], &["-o", "o"]].concat());
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{told}");
+    let page = fs::read_to_string(folder.path().join("o/index.html")).unwrap();
+    assert!(page.contains("r.film, 16 samples; its own noise is relMSE ") && !page.contains("flattens"), "{told}");
+    let csv = fs::read_to_string(folder.path().join("o/converge.csv")).unwrap();
+    let columns: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
+    for column in
+        ["relmse_trimmed", "error_trimmed_low", "error_trimmed_high", "bias_trimmed_half_width", "worst_share"]
+    {
+        assert!(columns.contains(&column), "{column}");
+    }
+}
+
+/// Refused before the methods have used their time, and before their files are made.
+#[test]
+fn a_reference_of_another_size_or_black_is_refused_first() {
+    let folder = ball_under_sky();
+    let render = |more: &[&str]| {
+        let output = marmor(folder.path(), &[&["render", "scene.toml", "-q", "--spp", "2"], more].concat());
+        assert!(output.status.success(), "{}", command::text(&output.stderr));
+    };
+    render(&["-o", "small.exr", "-D", "camera.resolution=[8,8]"]);
+    render(&["-o", "black.exr", "-D", "environment.radiance=0", "-D", "material.lamp.radiance=0"]);
+    for (reference, part) in [("small.exr", "8x8"), ("black.exr", "black")] {
+        let arguments = ["converge", "scene.toml", "--methods", "all", "--reference", reference, "-o", "out"];
+        let output = marmor(folder.path(), &arguments);
+        let told = command::text(&output.stderr);
+        assert!(!output.status.success() && told.contains(part), "{reference}: {told}");
+        assert!(!folder.path().join("out/all.jsonl").exists(), "{reference}");
+    }
 }
 
 #[test]

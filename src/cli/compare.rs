@@ -2,13 +2,14 @@
 
 use super::converge::{file_name, scene_name};
 use super::keep::cancel_on_signals;
-use super::race::{RaceArgs, Runner, command, machine, race};
-use super::read_picture;
-use marmor::Result;
-use marmor::film::{Checkpoint, Format, Image, Metadata, PngOptions, SelfError, metrics, png_bytes, save};
+use super::race::{RaceArgs, Reference, Runner, command, machine, race, remarks, same_size, stored};
+use marmor::film::{Image, Metadata, PngOptions, Truth, Window, brightness, judge, png_bytes, save};
+use marmor::integrator::View;
 use marmor::math::Rgb;
-use marmor::report::{Compared, ModelComparison, Picture, common_range, false_colours};
+use marmor::render::{Seen, first_hit};
+use marmor::report::{Compared, Figures, ModelComparison, Picture, PicturePart, common_range, false_colours};
 use marmor::scene::MethodName;
+use marmor::{Error, Result};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -16,7 +17,8 @@ use std::process::ExitCode;
 #[command(after_help = "\
 A model is one or more words joined by `+`, as for `marmor converge --methods`: standard, beam+notes, directional ...
 Writes for each model NAME.exr and NAME.png, NAME_difference.exr (signed), NAME_relative.exr and NAME_relative.png
-(false colours), then compare.csv and one page, index.html.")]
+(false colours), then compare.csv, compare.json and one page, index.html. Judged are the pixels of translucent objects,
+by what the camera sees first; silhouettes and background are told apart.")]
 pub struct Args {
     /// Models to compare, separated by commas
     #[arg(long, value_name = "A,B,C", value_delimiter = ',', required = true)]
@@ -33,21 +35,13 @@ pub fn run(args: Args) -> Result<ExitCode> {
     args.race.run(|| compare(&args.race, &args.models, args.truth.as_deref()))
 }
 
-/// A picture with the relMSE of its noise.
-struct Truth {
-    text: String,
-    image: Image,
-    /// Of its even and odd passes, where they are known.
-    halves: Option<[Image; 2]>,
-    noise: f64,
-}
-
 fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<ExitCode> {
     let entrants = args.entrants(models)?;
     let mut runners = entrants.iter().map(Runner::new).collect::<Result<Vec<_>>>()?;
     let cancel = cancel_on_signals();
     let budget = args.budget();
-    let truth = match &args.reference {
+    same_size(&runners)?;
+    let reference = match &args.reference {
         Some(path) => stored(path)?,
         None => {
             let spec = truth.unwrap_or(MethodName::VolumePath.name());
@@ -55,55 +49,35 @@ fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<Ex
             let entrant = args.reference_entrant(spec, Some(spec), 0x7472_7574)?;
             let mut runner = [Runner::new(&entrant)?];
             race(&mut runner, args.reference_budget(), &cancel, |_, r| r.follow())?;
-            let [runner] = runner;
-            let noise = runner.own.last().and_then(|e| e.relmse).map_or(0.0, |e| e.value);
-            let halves = runner.film.half_images();
-            Truth { text: spec.to_owned(), image: runner.film.image(), halves, noise }
+            let [mut runner] = runner;
+            let truth = Truth::of_film(&runner.film, &mut runner.own);
+            Reference { text: spec.to_owned(), truth, remarks: runner.remarks() }
         }
     };
+    reference.truth.check(&runners[0].film)?;
     args.say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
     let whole = race(&mut runners, budget, &cancel, |_, runner| runner.follow())?;
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
-    let footnotes = vec![format!("Machine: {}.", machine()), format!("Command: {}", command())];
-    let report = write(args, &mut runners, &truth, exposure, footnotes)?;
-    Ok(args.conclude(&report.sentences(), whole))
-}
-
-/// A picture that was rendered before. An EXR counts as free of noise; a film has the halves that tell it.
-fn stored(path: &Path) -> Result<Truth> {
-    let text = path.file_name().map_or("stored picture".into(), |name| name.to_string_lossy().into_owned());
-    if Format::of(path).is_ok_and(|format| format == Format::Film) {
-        let film = Checkpoint::read(path)?.film;
-        let noise = SelfError::new().measure(&film).and_then(|e| e.relmse).map_or(0.0, |e| e.value);
-        let text = format!("{text}, {} samples", film.passes());
-        return Ok(Truth { text, image: film.image(), halves: film.half_images(), noise });
-    }
-    Ok(Truth { text, image: read_picture(path, None)?, halves: None, noise: 0.0 })
+    let report = write(args, &mut runners, &reference, exposure)?;
+    Ok(args.conclude(&report.remarks, &report.sentences(), whole))
 }
 
 /// Longest side of a picture on the page [pixels].
 const SHOWN: u32 = 320;
 
-fn write(
-    args: &RaceArgs,
-    runners: &mut [Runner<'_>],
-    truth: &Truth,
-    exposure: f64,
-    footnotes: Vec<String>,
-) -> Result<ModelComparison> {
-    let folder = &args.output;
+fn write(args: &RaceArgs, runners: &mut [Runner<'_>], reference: &Reference, exposure: f64) -> Result<ModelComparison> {
+    let (folder, truth) = (&args.output, &reference.truth);
     let picture = |image: &Image, caption: &str, note: String, exposure: f64| -> Result<Picture> {
         let png = png_bytes(&image.shrunk(SHOWN), exposure)?;
         Ok(Picture { png, caption: caption.into(), note, pixelated: false })
     };
     save_both(folder, "reference", &truth.image, exposure)?;
-    let mut pictures = vec![picture(&truth.image, &truth.text, "reference".into(), exposure)?];
+    let mut pictures = vec![picture(&truth.image, &reference.text, "reference".into(), exposure)?];
+    let shares = translucent_shares(&runners[0]);
     let (mut models, mut relatives) = (Vec::new(), Vec::new());
     for runner in runners.iter_mut() {
         let (image, name) = (runner.film.image(), &runner.entrant.name);
         let file = file_name(name);
-        let comparison = metrics::compare(&image, &truth.image, None)?;
-        let point = runner.measure(&truth.image)?;
         let [signed, relative] = differences(&image, &truth.image);
         save_both(folder, &file, &image, exposure)?;
         for (suffix, image) in [("difference", &signed), ("relative", &relative)] {
@@ -117,14 +91,7 @@ fn write(
             name: name.clone(),
             seconds: runner.seconds.total(),
             samples: runner.film.passes(),
-            mean_ratio: comparison.mean_ratio,
-            squared_bias: runner
-                .film
-                .half_images()
-                .and_then(|halves| metrics::squared_bias(&halves, &truth.image, truth.halves.as_ref())),
-            measured: comparison.whole.relmse.map_or(0.0, |e| e.value),
-            noise: point.own.unwrap_or(0.0),
-            width: point.width,
+            parts: parts(runner, truth, &shares)?,
         });
     }
     let range = common_range(relatives.iter().map(|(_, _, image)| image));
@@ -137,16 +104,40 @@ fn write(
     }
     let report = ModelComparison {
         scene: scene_name(&args.scene),
-        reference: truth.text.clone(),
-        reference_noise: truth.noise,
-        reference_halves: truth.halves.is_some(),
+        reference: reference.text.clone(),
+        reference_noise: truth.noise(),
         models,
         range,
-        footnotes,
+        remarks: remarks(runners, reference),
+        footnotes: vec![format!("Machine: {}.", machine()), format!("Command: {}", command())],
     };
     args.write("compare.csv", &report.to_csv())?;
+    let json = serde_json::to_string_pretty(&report).map_err(|e| Error::file(folder, "write compare.json", e))?;
+    args.write("compare.json", &json)?;
     args.write("index.html", &report.page(&pictures, &shown).to_html())?;
     Ok(report)
+}
+
+/// The share of each pixel where the camera meets a translucent object first.
+fn translucent_shares(runner: &Runner<'_>) -> Vec<f32> {
+    let (scene, window) = (&runner.entrant.prepared.scene, Window::full(runner.film.resolution()));
+    let seen = first_hit(View { scene, rays: runner.rays() }, window, Seen::Translucent);
+    seen.pixels.iter().map(|p| p[0]).collect()
+}
+
+/// The figures of a model over each part of the picture that has pixels.
+fn parts(runner: &mut Runner<'_>, truth: &Truth, shares: &[f32]) -> Result<Vec<Figures>> {
+    let mut out = Vec::new();
+    for part in PicturePart::ORDER {
+        let set: Vec<bool> = shares.iter().map(|&share| part.has(share)).collect();
+        let pixels = set.iter().filter(|in_it| **in_it).count();
+        if pixels > 0 {
+            let judgement = judge(&runner.film, &mut runner.own, truth, Some(&set))?;
+            let brightness = brightness(&runner.film, &runner.own, truth, Some(&set))?;
+            out.push(Figures { part, pixels, brightness, judgement });
+        }
+    }
+    Ok(out)
 }
 
 fn save_both(folder: &Path, name: &str, image: &Image, exposure: f64) -> Result<()> {

@@ -2,11 +2,10 @@
 
 use super::keep::cancel_on_signals;
 use super::observers::{Records, error_figures};
-use super::race::{RaceArgs, Runner, command, machine, race};
-use super::read_picture;
-use marmor::film::{Image, Window, png_bytes};
-use marmor::report::{Convergence, ErrorCurve, Picture, Record, RecordFile, Reference};
-use marmor::{Error, Result};
+use super::race::{RaceArgs, Reference, Runner, command, machine, race, remarks, same_size, stored};
+use marmor::Result;
+use marmor::film::{Image, Truth, Window, png_bytes};
+use marmor::report::{Convergence, ErrorCurve, Picture, Record, RecordFile};
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
@@ -37,12 +36,10 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
     let cancel = cancel_on_signals();
     let budget = args.budget();
     let resolution = runners[0].film.resolution();
-    if let Some(other) = runners.iter().find(|r| r.film.resolution() != resolution) {
-        let name = &other.entrant.name;
-        return Err(Error::usage(format!("`{name}` has another resolution; pictures of one size are compared")));
-    }
-
-    let (image, reference) = reference(args, &cancel)?;
+    same_size(&runners)?;
+    let reference = reference(args, &cancel)?;
+    let truth = &reference.truth;
+    truth.check(&runners[0].film)?;
 
     let name = |i: usize| file_name(&entrants[i].name);
     let mut records = Vec::new();
@@ -61,11 +58,11 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
         // Measuring takes milliseconds; steps of 3 % leave out nothing that a plot shows.
         if passes >= next[i] || runner.seconds.total() >= budget {
             next[i] = passes + 1 + passes / 32;
-            curves[i].points.push(runner.measure(&image)?);
+            curves[i].points.push(runner.measure(truth)?);
             let record = Records::record(runner.seconds_setup, runner.seconds, &runner.tally, &runner.film);
             let own = runner.own.last().as_ref().map(Into::into);
             records[i].0.append(&Record {
-                error: Some(error_figures(&runner.film.image(), &image)?),
+                error: Some(error_figures(&runner.film.image(), &truth.image)?),
                 own,
                 ..record
             })?;
@@ -83,7 +80,9 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
     let report = Convergence {
         scene: scene_name(&args.scene),
         curves,
-        reference,
+        reference: reference.text.clone(),
+        reference_tells_noise: truth.tells_noise(),
+        remarks: remarks(&runners, &reference),
         footnotes: vec![
             format!("Machine: {}.", machine()),
             format!("Command: {}", command()),
@@ -91,33 +90,43 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
         ],
     };
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
-    write_report(args, &report, &runners, &image, exposure)?;
-    Ok(args.conclude(&report.sentences(), whole))
+    write_report(args, &report, &runners, &truth.image, exposure)?;
+    Ok(args.conclude(&report.remarks, &report.sentences(), whole))
 }
 
-/// The reference as given, or rendered with the scene's own method, another seed and a longer time.
-fn reference(args: &RaceArgs, cancel: &AtomicBool) -> Result<(Image, Reference)> {
+/// The reference as given, or rendered with the scene's own method, another seed and a longer time; with a line for people.
+fn reference(args: &RaceArgs, cancel: &AtomicBool) -> Result<Reference> {
     if let Some(path) = &args.reference {
-        let text = format!("{}, taken as exact", path.display());
-        return Ok((read_picture(path, None)?, Reference { text, noise: 0.0 }));
+        let mut reference = stored(path)?;
+        reference.text = format!("{}; {}", reference.text, noise_text(&reference.truth));
+        return Ok(reference);
     }
     let budget = args.reference_budget();
     args.say(&format!("reference: {budget:.0} s"));
     let entrant = args.reference_entrant("reference", None, 0x7265_6665)?;
     let mut runners = [Runner::new(&entrant)?];
-    race(&mut runners, budget, cancel, |_, _| Ok(()))?;
+    race(&mut runners, budget, cancel, |_, r| r.follow())?;
     let [mut runner] = runners;
-    let noise = runner.own.measure(&runner.film).and_then(|e| e.relmse).map_or(0.0, |e| e.value);
-    let image = runner.film.image();
+    let truth = Truth::of_film(&runner.film, &mut runner.own);
     let text = format!(
-        "{}, another seed, {} samples of each pixel in {:.1} s; its own noise is relMSE {noise:.1e} and taken off",
+        "{}, another seed, {} samples of each pixel in {:.1} s; {}",
         entrant.prepared.describe(),
         runner.film.passes(),
-        runner.seconds.total()
+        runner.seconds.total(),
+        noise_text(&truth)
     );
     let path = args.output.join("reference.exr");
-    marmor::film::save(&image, &path, &Default::default(), Default::default())?;
-    Ok((image, Reference { text, noise }))
+    marmor::film::save(&truth.image, &path, &Default::default(), Default::default())?;
+    Ok(Reference { text, truth, remarks: runner.remarks() })
+}
+
+fn noise_text(truth: &Truth) -> String {
+    match truth.noise().map(|noise| (noise.value, noise.interval)) {
+        Some((value, Some([low, high]))) => {
+            format!("its own noise is relMSE {value:.1e} (95 %: {low:.1e} to {high:.1e}) and taken off")
+        }
+        _ => "its own noise is not known and in every figure".into(),
+    }
 }
 
 fn write_report(

@@ -93,6 +93,15 @@ fn table(args: &Args, c: &Comparison) -> String {
     let channel = ["R", "G", "B"][c.max_channel];
     let [x, y] = c.max_pixel;
     let _ = writeln!(out, "{:<28}{:>12}   at pixel {x},{y}, {channel}", "largest difference", number(c.max_difference));
+    if let Some(share) = c.worst_share {
+        let ([x, y], share) = (c.worst_pixel, 100.0 * share);
+        let note =
+            if share > 50.0 { ": the relMSE and its interval say little of the others, see trimmed" } else { "" };
+        let _ = writeln!(out, "{:<28}{share:>10.2} %   at pixel {x},{y}{note}", "worst pixel, of relMSE");
+    }
+    if c.max_difference == 0.0 {
+        out.push_str("the pictures are the same to the last bit: one render, or the same seed twice\n");
+    }
     let interior = c.interior.map_or(String::new(), |i| format!(", {} interior", i.pixels));
     let _ = writeln!(out, "{:<28}{:>12}   of {}{interior}", "pixels compared", c.whole.pixels, c.window.area());
     out

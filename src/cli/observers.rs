@@ -4,7 +4,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use marmor::Result;
 use marmor::film::metrics::{self, Estimate};
 use marmor::film::{Film, Image};
-use marmor::film::{SelfError, SelfErrors};
+use marmor::film::{SelfError, SelfErrors, WorstPixel};
 use marmor::integrator::Tally;
 use marmor::render::{Observer, Progress, Seconds};
 use marmor::report::{ErrorFigures, Record, RecordFile};
@@ -38,7 +38,33 @@ impl OwnError {
     pub fn relmse(&self) -> Option<Estimate> {
         self.0.get().and_then(|e| e.relmse)
     }
+
+    /// What a render of `passes` says of its error at its end.
+    pub fn text(&self, passes: u32) -> String {
+        let Some(told) = self.get() else {
+            return format!("no relMSE is estimated: {passes} of the 2 passes that it needs");
+        };
+        let Some(relmse) = told.relmse else { return "no relMSE is estimated: the picture is black".into() };
+        let interval = match relmse.interval {
+            Some([low, high]) => format!("(95 %: {low:.2e} to {high:.2e})"),
+            None if relmse.value > 0.0 && passes >= 4 => "(no interval: the earlier passes were not followed)".into(),
+            None if relmse.value > 0.0 => "(no interval before 4 passes)".into(),
+            None => "(no noise)".into(),
+        };
+        let out = format!("estimated relMSE {:.2e} {interval}", relmse.value);
+        match told.worst.filter(|worst| worst.share > HANGS) {
+            Some(WorstPixel { pixel: [x, y], share, relmse }) => format!(
+                "{out}; no verdict: one pixel carries {:.0} % of the noise (pixel {x},{y}); with its light taken for noise, \
+                 relMSE {relmse:.1e}",
+                100.0 * share
+            ),
+            None => out,
+        }
+    }
 }
+
+/// A pixel with more of the noise than this leaves no verdict.
+const HANGS: f64 = 0.5;
 
 /// Measures the error from the halves of the film and stops the render when it is small enough. Goes before the
 /// observers that show it.
@@ -163,10 +189,12 @@ impl Observer for ProgressDisplay {
         let elapsed = progress.seconds.total();
         let error = self.own.relmse().map_or(String::new(), |e| {
             let wanted = self.target.map_or(String::new(), |t| format!(" of {t:.1e}"));
-            format!(", relMSE {:.1e}{wanted}", e.value)
+            let factor = e.interval.map_or("?".into(), |[low, high]| format!("{:.1}", (high / low).sqrt()));
+            format!(", relMSE {:.1e} ×/÷ {factor}{wanted}", e.value)
         });
         // Before anything is known of an error to reach there is no time left to tell.
-        let left = if done > 0.0 { format!("{} left", clock(elapsed * (1.0 / done - 1.0))) } else { "? left".into() };
+        let left =
+            if done > 0.0 { format!("about {} left", clock(elapsed * (1.0 / done - 1.0))) } else { "? left".into() };
         let line = format!("pass {passes}, {} elapsed, {left}{error}", clock(elapsed));
         match &mut self.shown {
             Shown::Silent => {}
@@ -271,6 +299,31 @@ mod tests {
             }
             assert_eq!(share(&mut trend, 120), 1.0);
         }
+    }
+
+    #[test]
+    fn the_end_says_what_is_not_known() {
+        let text = |passes: u32, sample: &dyn Fn(u32, usize) -> f32| {
+            let window = marmor::film::Window::full([16, 16]);
+            let (mut film, mut error, told) =
+                (Film::new([16, 16], window).unwrap(), SelfError::new(), OwnError::default());
+            for pass in 0..passes {
+                let samples: Vec<_> = (0..256).map(|i| marmor::math::Rgb::splat(sample(pass, i))).collect();
+                film.add(window, &samples);
+                film.end_pass();
+                told.0.set(error.measure(&film));
+            }
+            told.text(passes)
+        };
+        let noise =
+            |pass: u32, i: usize| 1.0 + (marmor::math::hash(u64::from(pass) << 20 | i as u64) % 100) as f32 / 100.0;
+        assert!(text(1, &noise).contains("1 of the 2 passes"));
+        assert!(text(3, &noise).contains("no interval before 4 passes"));
+        assert!(text(8, &noise).contains("(95 %: ") && !text(8, &noise).contains("no verdict"));
+        assert!(text(8, &|_, _| 0.0).contains("black"));
+        let speck = |pass: u32, i: usize| if (pass, i) == (3, 35) { 1e4 } else { noise(pass, i) };
+        let said = text(8, &speck);
+        assert!(said.contains("no verdict: one pixel carries 100 % of the noise (pixel 3,2)"), "{said}");
     }
 
     #[test]

@@ -2,8 +2,7 @@
 
 use super::render::duration;
 use super::setup::{MethodArgs, Prepared, prepare};
-use marmor::film::metrics;
-use marmor::film::{Film, Image, SelfError, Window, write_atomically};
+use marmor::film::{Checkpoint, Film, Format, SelfError, Truth, Window, judge, write_atomically};
 use marmor::integrator::{Tally, View};
 use marmor::query::{self, RayQuery};
 use marmor::render::{Job, Seconds};
@@ -19,8 +18,8 @@ use std::time::{Duration, Instant};
 pub struct RaceArgs {
     /// The scene file
     pub scene: PathBuf,
-    /// Measure against this EXR (or for `compare` a film file, which tells its own noise) instead of a reference rendered for it
-    #[arg(long, value_name = "EXR")]
+    /// Measure against this film file, which tells its own noise, or EXR, which does not, instead of a reference rendered for it
+    #[arg(long, value_name = "FILM|EXR")]
     pub reference: Option<PathBuf>,
     /// Time of rendering for each of them, such as 20s
     #[arg(long, value_name = "TIME", value_parser = duration, default_value = "20s")]
@@ -85,8 +84,9 @@ impl RaceArgs {
         write_atomically(&self.output.join(name), |out| out.write_all(text.as_bytes()))
     }
 
-    /// Says the sentences and where the page is; `whole` is false after an interruption.
-    pub fn conclude(&self, sentences: &[String], whole: bool) -> ExitCode {
+    /// Says remarks, sentences and where the page is; `whole` is false after an interruption.
+    pub fn conclude(&self, remarks: &[String], sentences: &[String], whole: bool) -> ExitCode {
+        remarks.iter().for_each(|remark| self.say(&format!("warning: {remark}")));
         sentences.iter().for_each(|sentence| self.say(sentence));
         self.say(&format!("wrote {}", self.output.join("index.html").display()));
         if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) }
@@ -147,6 +147,11 @@ impl<'a> Runner<'a> {
         })
     }
 
+    /// What answers rays in its scene.
+    pub fn rays(&self) -> &dyn RayQuery {
+        &*self.rays
+    }
+
     /// One more pass; false if `cancel` was set.
     pub fn pass(&mut self, cancel: &AtomicBool) -> Result<bool> {
         let prepared = &self.entrant.prepared;
@@ -170,20 +175,82 @@ impl<'a> Runner<'a> {
     }
 
     /// The errors as they are now.
-    pub fn measure(&mut self, reference: &Image) -> Result<ErrorPoint> {
-        let own = self.own.measure(&self.film).and_then(|e| e.relmse);
-        let errors = metrics::compare(&self.film.image(), reference, None)?.whole;
-        let Some(relmse) = errors.relmse else {
-            return Err(Error::usage("the reference is black: no relative error"));
+    pub fn measure(&mut self, truth: &Truth) -> Result<ErrorPoint> {
+        let judgement = judge(&self.film, &mut self.own, truth, None)?;
+        let Some(judgement) = judgement else {
+            return Err(Error::usage(format!("`{}`: no pixel is a finite number", self.entrant.name)));
         };
-        Ok(ErrorPoint {
-            samples: self.film.passes(),
-            seconds: self.seconds.total(),
-            measured: relmse.value,
-            own: own.map(|e| e.value),
-            width: own.and_then(|e| e.interval).map(|[low, high]| (high / low).ln() / 2.0),
-        })
+        Ok(ErrorPoint { samples: self.film.passes(), seconds: self.seconds.total(), judgement, told: self.own.last() })
     }
+
+    /// What must be known of this render before its figures: samples left out, paths lost, warnings of its scene. Whatever a
+    /// run reports beside numbers goes here, and so to the top of the page and of the text.
+    pub fn remarks(&self) -> Vec<String> {
+        let (name, counts, gather, walk) =
+            (&self.entrant.name, self.film.counts(), &self.tally.gather, &self.tally.walk);
+        let causes = [
+            (counts.non_finite, "samples are not finite and were left out"),
+            (gather.non_finite, "cached samples are not finite and were left out"),
+            (counts.negative, "samples are below zero"),
+        ];
+        let counted = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{name}: {n} {what}"));
+        let lost = (walk.lost as f64 > MOST_LOST * walk.walks as f64).then(|| {
+            format!("{name}: {} of {} paths inside bodies were lost and carry nothing", walk.lost, walk.walks)
+        });
+        let warnings = self.entrant.prepared.scene.warnings.iter().map(ToString::to_string);
+        counted.chain(lost).chain(warnings).collect()
+    }
+}
+
+/// Share of the paths inside bodies that may be lost without a remark.
+const MOST_LOST: f64 = 1e-3;
+
+/// What films are held against.
+pub struct Reference {
+    /// For people.
+    pub text: String,
+    pub truth: Truth,
+    /// Of the render that made it.
+    pub remarks: Vec<String>,
+}
+
+/// Remarks on all renders and their reference, each once: what a report puts first.
+pub fn remarks(runners: &[Runner<'_>], reference: &Reference) -> Vec<String> {
+    let not_finite = reference.truth.image.pixels.iter().filter(|p| !p.is_finite()).count();
+    let not_finite =
+        (not_finite > 0).then(|| format!("{not_finite} pixels of the reference are not finite and count nowhere"));
+    let mut out: Vec<String> = Vec::new();
+    let own = runners.iter().flat_map(Runner::remarks);
+    for remark in not_finite.into_iter().chain(reference.remarks.iter().cloned()).chain(own) {
+        if !out.contains(&remark) {
+            out.push(remark);
+        }
+    }
+    out
+}
+
+/// Refuses renders of different sizes.
+pub fn same_size(runners: &[Runner<'_>]) -> Result<()> {
+    let resolution = runners[0].film.resolution();
+    match runners.iter().find(|r| r.film.resolution() != resolution) {
+        Some(other) => {
+            let name = &other.entrant.name;
+            Err(Error::usage(format!("`{name}` has another resolution; pictures of one size are compared")))
+        }
+        None => Ok(()),
+    }
+}
+
+/// A reference that was rendered before: an EXR does not tell its noise, a film does.
+pub fn stored(path: &Path) -> Result<Reference> {
+    let text = path.file_name().map_or("stored picture".into(), |name| name.to_string_lossy().into_owned());
+    if Format::of(path).is_ok_and(|format| format == Format::Film) {
+        let film = Checkpoint::read(path)?.film;
+        let text = format!("{text}, {} samples", film.passes());
+        let truth = Truth::of_film(&film, &mut SelfError::new());
+        return Ok(Reference { text, truth, remarks: Vec::new() });
+    }
+    Ok(Reference { text, truth: Truth::picture(super::read_picture(path, None)?), remarks: Vec::new() })
 }
 
 /// Passes in turns until each entrant has used `budget` seconds of its own; `after` is called after each pass. The one

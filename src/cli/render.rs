@@ -283,15 +283,13 @@ impl Task<'_> {
                 Stop::Cancelled => "; interrupted",
             }
         );
-        if let Some(own) = self.own.relmse() {
-            let interval =
-                own.interval.map_or(String::new(), |[low, high]| format!(" (95 %: {low:.2e} to {high:.2e})"));
-            eprintln!("estimated relMSE {:.2e}{interval}", own.value);
-        }
+        eprintln!("{}", self.own.text(film.passes()));
         if let Some(reference) = &self.reference {
             let e = error_figures(&film.image(), reference)?;
             let relative = e.relmse.map_or(String::new(), |value| format!(", relMSE {value:.4e}"));
-            let interval = e.interval.map_or(String::new(), |[low, high]| format!(" (95 %: {low:.4e} to {high:.4e})"));
+            let interval = e
+                .interval
+                .map_or(" (interval unknown)".into(), |[low, high]| format!(" (95 %: {low:.4e} to {high:.4e})"));
             eprintln!("against the reference: RMSE {:.4e}{relative}{interval}", e.rmse);
         }
         if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 {

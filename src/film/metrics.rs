@@ -69,6 +69,10 @@ pub struct Comparison {
     pub max_pixel: [u32; 2],
     /// Where that is: channel, 0 to 2.
     pub max_channel: usize,
+    /// Share of the worst pixel in the relMSE over all pixels; none without an error, or where the reference is black.
+    pub worst_share: Option<f64>,
+    /// Which that is, [x, y] of the whole picture.
+    pub worst_pixel: [u32; 2],
 }
 
 /// Compares `image` with `reference`. `interior` marks, in the order of the pixels, those that also count on their
@@ -77,14 +81,7 @@ pub struct Comparison {
 /// # Errors
 /// Usage if the resolutions, the windows or the mask's length differ; Numeric if no pixel is finite in both.
 pub fn compare(image: &Image, reference: &Image, interior: Option<&[bool]>) -> Result<Comparison> {
-    if image.resolution != reference.resolution || image.window != reference.window {
-        let size = |i: &Image| format!("{}x{} with pixels {}", i.resolution[0], i.resolution[1], i.window);
-        return Err(Error::usage(format!(
-            "pictures of different sizes cannot be compared: {} against the reference's {} (x0,y0,x1,y1)",
-            size(image),
-            size(reference)
-        )));
-    }
+    same_size(image, reference)?;
     let (x, r) = (&image.pixels, &reference.pixels);
     let finite: Vec<bool> = x.iter().zip(r).map(|(x, r)| x.is_finite() && r.is_finite()).collect();
     if !finite.contains(&true) {
@@ -109,6 +106,7 @@ pub fn compare(image: &Image, reference: &Image, interior: Option<&[bool]>) -> R
             }
         }
     }
+    let (worst, worst_share) = worst_of(x, r, &finite);
     let not_finite = |pixels: &[Rgb]| pixels.iter().filter(|p| !p.is_finite()).count();
     Ok(Comparison {
         resolution: image.resolution,
@@ -121,7 +119,40 @@ pub fn compare(image: &Image, reference: &Image, interior: Option<&[bool]>) -> R
         max_difference: max.0,
         max_pixel: max.1,
         max_channel: max.2,
+        worst_share,
+        worst_pixel: image.window.pixel(worst),
     })
+}
+
+/// The pixel with the largest relative squared error and its share of the sum.
+fn worst_of(x: &[Rgb], r: &[Rgb], used: &[bool]) -> (usize, Option<f64>) {
+    let pixels: Vec<usize> = (0..used.len()).filter(|&i| used[i]).collect();
+    let level: f64 = pixels.iter().flat_map(|&i| r[i].0).map(f64::from).sum();
+    let floor = 0.01 * (level / (3 * pixels.len()) as f64).powi(2);
+    let square = |i: usize| -> f64 {
+        let one = |c: usize| (f64::from(x[i][c]) - f64::from(r[i][c])).powi(2) / (f64::from(r[i][c]).powi(2) + floor);
+        (0..3).map(one).sum()
+    };
+    let (mut sum, mut worst) = (0.0, (0, 0.0));
+    for &i in &pixels {
+        let one = square(i);
+        sum += one;
+        worst = if one > worst.1 { (i, one) } else { worst };
+    }
+    (worst.0, (floor > 0.0 && sum > 0.0).then(|| worst.1 / sum))
+}
+
+/// Whether two pictures have the same pixels.
+pub(super) fn same_size(image: &Image, reference: &Image) -> Result<()> {
+    if image.resolution != reference.resolution || image.window != reference.window {
+        let size = |i: &Image| format!("{}x{} with pixels {}", i.resolution[0], i.resolution[1], i.window);
+        return Err(Error::usage(format!(
+            "pictures of different sizes cannot be compared: {} against the reference's {} (x0,y0,x1,y1)",
+            size(image),
+            size(reference)
+        )));
+    }
+    Ok(())
 }
 
 /// The errors of a film's image against what it converges to, estimated from its two halves: with even and odd
@@ -144,28 +175,6 @@ pub fn from_halves(film: &Film, interior: Option<&[bool]>) -> Option<Errors> {
             f64::from(even.pixels[i][c]) - f64::from(odd.pixels[i][c])
         })
     })
-}
-
-/// mean((x_e - r_e) (x_o - r_o) / (r² + 0.01 mean(r)²)) over pixels and channels, from the independent halves e and o of a
-/// picture x and of its reference r: the squared relative bias. The noise of neither is in its expectation, and a bright
-/// speck, which is in one half alone, does not count squared. A reference without halves stands for both, and leaves its
-/// noise in. None where the reference is black, or the sizes differ.
-pub fn squared_bias(halves: &[Image; 2], reference: &Image, reference_halves: Option<&[Image; 2]>) -> Option<f64> {
-    let r = &reference.pixels;
-    let [re, ro] = reference_halves.map_or([r, r], |[e, o]| [&e.pixels, &o.pixels]);
-    let [xe, xo] = [&halves[0].pixels, &halves[1].pixels];
-    if [xe, xo, re, ro].iter().any(|p| p.len() != r.len()) {
-        return None;
-    }
-    let used = |i: &usize| [xe, xo, re, ro, r].iter().all(|p| p[*i].is_finite());
-    let pixels: Vec<usize> = (0..r.len()).filter(used).collect();
-    let count = (3 * pixels.len()).max(1) as f64;
-    let floor = 0.01 * (pixels.iter().flat_map(|&i| r[i].0).map(f64::from).sum::<f64>() / count).powi(2);
-    let product = |i: usize, c: usize| {
-        let difference = |x: &[Rgb], r: &[Rgb]| f64::from(x[i][c]) - f64::from(r[i][c]);
-        difference(xe, re) * difference(xo, ro) / (f64::from(r[i][c]).powi(2) + floor)
-    };
-    (floor > 0.0).then(|| pixels.iter().map(|&i| (0..3).map(|c| product(i, c)).sum::<f64>()).sum::<f64>() / count)
 }
 
 fn errors(window: Window, x: &[Rgb], r: &[Rgb], scale: f64, used: &[bool]) -> Errors {
@@ -295,25 +304,6 @@ pub fn student_975(freedom: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash;
-
-    /// A picture 1.2 times its reference, all four halves with noise of 50 %: the square of 0.2 comes out.
-    #[test]
-    fn the_squared_bias_is_free_of_noise() {
-        let noise =
-            |seed: u64, x: u32, y: u32| (hash(seed << 32 | u64::from(y * 200 + x)) >> 40) as f32 / 16_777_216.0 - 0.5;
-        let half = |seed, level: f32| Image::from_fn([200, 200], |x, y| Rgb::splat(level * (1.0 + noise(seed, x, y))));
-        let (x, r) = ([half(1, 1.2), half(2, 1.2)], [half(3, 1.0), half(4, 1.0)]);
-        let reference = Image::from_fn([200, 200], |_, _| Rgb::splat(1.0));
-        let expected = 0.04 / 1.01;
-        // A product of two differences of variance (1.44 + 1) / 12 about 0.2, 40000 of them: standard error 0.0013.
-        let found = squared_bias(&x, &reference, Some(&r)).unwrap();
-        assert!((found - expected).abs() < 6.0 * 0.0013, "{found}");
-        // Taken for free of noise, the reference's own stays in if both halves are told from the same picture.
-        let same = squared_bias(&x, &r[0], None).unwrap();
-        assert!(same > expected + 0.05, "{same}");
-        assert!(squared_bias(&x, &half(5, 0.0), None).is_none());
-    }
 
     #[test]
     fn student_factors_are_those_of_the_tables() {

@@ -30,6 +30,20 @@ pub struct SelfErrors {
     /// The same, with more weight for a pixel that has met little light and much at a time: for ending a render. `relmse`
     /// is too small where many pixels are like that, this is a little too large where few are.
     pub relmse_careful: Option<f64>,
+    /// The pixel that carries most of the noise, where a speck of one half does not count for the level of its pixel; none
+    /// without noise.
+    pub worst: Option<WorstPixel>,
+}
+
+/// A pixel and what hangs on it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WorstPixel {
+    /// Column and row of the whole picture.
+    pub pixel: [u32; 2],
+    /// Its share of the noise.
+    pub share: f64,
+    /// relMSE of all pixels, with the lesser half for the level of each: what it is if bright specks are noise.
+    pub relmse: f64,
 }
 
 /// Follows a film while it grows and estimates its error. It keeps two earlier states of the film, 24 bytes each for a
@@ -43,13 +57,13 @@ pub struct SelfError {
 
 /// Sums of radiance and passes of the two halves at one time.
 #[derive(Clone, Debug)]
-struct State {
-    passes: [u32; 2],
+pub(super) struct State {
+    pub(super) passes: [u32; 2],
     sums: [Vec<Rgb>; 2],
 }
 
 impl State {
-    fn of(film: &Film) -> Option<Self> {
+    pub(super) fn of(film: &Film) -> Option<Self> {
         let passes = film.half_passes();
         if passes.contains(&0) {
             return None;
@@ -59,8 +73,53 @@ impl State {
         Some(Self { passes, sums: [sum(e, passes[0]), sum(o, passes[1])] })
     }
 
-    fn total(&self) -> u32 {
+    pub(super) fn total(&self) -> u32 {
         self.passes[0] + self.passes[1]
+    }
+
+    /// Mean of half `half` at pixel i.
+    pub(super) fn half(&self, half: usize, i: usize, c: usize) -> f64 {
+        f64::from(self.sums[half][i][c]) / f64::from(self.passes[half])
+    }
+
+    /// Even less odd.
+    fn difference(&self, i: usize, c: usize) -> f64 {
+        self.half(0, i, c) - self.half(1, i, c)
+    }
+
+    fn mean(&self, i: usize, c: usize) -> f64 {
+        let n = self.passes.map(f64::from);
+        (n[0] * self.half(0, i, c) + n[1] * self.half(1, i, c)) / (n[0] + n[1])
+    }
+
+    /// What the square of [`Self::difference`] is to be multiplied by to be that of an error of the mean.
+    pub(super) fn scale(&self) -> f64 {
+        let n = self.passes.map(f64::from);
+        n[0] * n[1] / (n[0] + n[1]).powi(2)
+    }
+
+    /// S of the head of this file.
+    pub(super) fn noise(&self, pixels: &[usize], weight: Weight<'_>) -> f64 {
+        let square = |i: usize, c: usize| weight(i, c) * self.difference(i, c).powi(2);
+        let sum: f64 = pixels.iter().map(|&i| (0..3).map(|c| square(i, c)).sum::<f64>()).sum();
+        self.scale() * sum / (3 * pixels.len()) as f64
+    }
+
+    /// The worst pixel, weighted by the lesser half: a bright speck is in one half alone.
+    fn worst(&self, pixels: &[usize], window: Window) -> Option<WorstPixel> {
+        let lesser = |i: usize, c: usize| self.half(0, i, c).min(self.half(1, i, c)).max(0.0);
+        let level: f64 = pixels.iter().map(|&i| (0..3).map(|c| lesser(i, c)).sum::<f64>()).sum();
+        let floor = 0.01 * (level / (3 * pixels.len()) as f64).powi(2);
+        let square =
+            |i: usize| -> f64 { (0..3).map(|c| self.difference(i, c).powi(2) / (lesser(i, c).powi(2) + floor)).sum() };
+        let (mut sum, mut worst) = (0.0, (0, 0.0));
+        for &i in pixels {
+            let one = square(i);
+            sum += one;
+            worst = if one > worst.1 { (i, one) } else { worst };
+        }
+        let relmse = self.scale() * sum / (3 * pixels.len()) as f64;
+        (floor > 0.0 && sum > 0.0).then(|| WorstPixel { pixel: window.pixel(worst.0), share: worst.1 / sum, relmse })
     }
 
     /// Whether both halves of `later` have passes that this has not, together so many that their noise is like that of
@@ -71,7 +130,7 @@ impl State {
     }
 
     /// Mean of half `half` over the passes of `self`, less the mean over the passes from then to `later`, at pixel i.
-    fn contrast(&self, later: &Self, half: usize, i: usize) -> [f64; 3] {
+    pub(super) fn contrast(&self, later: &Self, half: usize, i: usize) -> [f64; 3] {
         let (n, more) = (f64::from(self.passes[half]), f64::from(later.passes[half] - self.passes[half]));
         std::array::from_fn(|c| {
             let (before, all) = (f64::from(self.sums[half][i][c]), f64::from(later.sums[half][i][c]));
@@ -81,7 +140,7 @@ impl State {
 }
 
 /// Weight of the squared error in each channel of each pixel.
-type Weight<'a> = &'a dyn Fn(usize, usize) -> f64;
+pub(super) type Weight<'a> = &'a dyn Fn(usize, usize) -> f64;
 
 impl SelfError {
     /// Of all pixels.
@@ -99,38 +158,22 @@ impl SelfError {
     pub fn measure(&mut self, film: &Film) -> Option<SelfErrors> {
         let now = State::of(film)?;
         self.earlier.retain(|s| (0..2).all(|h| s.passes[h] <= now.passes[h]));
-        let n = [0, 1].map(|h| f64::from(now.passes[h]));
-        let all = n[0] + n[1];
         let pixels = self.pixels.take().unwrap_or_else(|| (0..film.window().area()).collect());
-        let halves = |i: usize, c: usize| [0, 1].map(|h| f64::from(now.sums[h][i][c]) / n[h]);
-        let mean = |i: usize, c: usize| (n[0] * halves(i, c)[0] + n[1] * halves(i, c)[1]) / all;
-        let level = pixels.iter().map(|&i| (0..3).map(|c| mean(i, c)).sum::<f64>()).sum::<f64>();
+        let level = pixels.iter().map(|&i| (0..3).map(|c| now.mean(i, c)).sum::<f64>()).sum::<f64>();
         let floor = 0.01 * (level / (3 * pixels.len()) as f64).powi(2);
-        let scale = n[0] * n[1] / (all * all * (3 * pixels.len()) as f64);
-        let before = self.earlier.iter().rev().find(|s| s.is_far_before(&now));
-        let difference = |i: usize, c: usize| halves(i, c)[0] - halves(i, c)[1];
-        let value = |weight: Weight<'_>| {
-            let square = |i: usize, c: usize| weight(i, c) * difference(i, c).powi(2);
-            scale * pixels.iter().map(|&i| (0..3).map(|c| square(i, c)).sum::<f64>()).sum::<f64>()
-        };
-        let estimate = |weight: Weight<'_>| {
-            let value = value(weight);
-            let width = before
-                .and_then(|before| Together::of(film.window(), &pixels, [before, &now], weight))
-                .and_then(Together::log_width);
-            Estimate { value, interval: width.map(|w| [value * (-w).exp(), value * w.exp()]) }
-        };
+        let estimate = |weight: Weight<'_>| self.estimate(film.window(), &now, &pixels, weight);
         // Noise of a pixel is in its own level too: a first bright sample makes it bright and so its error relatively small.
         // The square of the level without some of that noise is nearer to the square of the limit.
         let level = |i: usize, c: usize| {
-            let noise = n[0] * n[1] / (all * all) * difference(i, c).powi(2);
-            (mean(i, c).powi(2) - CAREFUL * noise).max(0.0)
+            let noise = now.scale() * now.difference(i, c).powi(2);
+            (now.mean(i, c).powi(2) - CAREFUL * noise).max(0.0)
         };
         let lit = floor > 0.0;
         let errors = SelfErrors {
             rmse: estimate(&|_, _| 1.0).sqrt(),
-            relmse: lit.then(|| estimate(&|i, c| 1.0 / (mean(i, c).powi(2) + floor))),
-            relmse_careful: lit.then(|| value(&|i, c| 1.0 / (level(i, c) + floor))),
+            relmse: lit.then(|| estimate(&|i, c| 1.0 / (now.mean(i, c).powi(2) + floor))),
+            relmse_careful: lit.then(|| now.noise(&pixels, &|i, c| 1.0 / (level(i, c) + floor))),
+            worst: now.worst(&pixels, film.window()),
         };
         if self.pixels.is_none() && pixels.len() != film.window().area() {
             self.pixels = Some(pixels);
@@ -138,6 +181,21 @@ impl SelfError {
         self.keep(now);
         self.last = Some(errors);
         Some(errors)
+    }
+
+    /// The film when it had fewer passes, so many fewer that the difference between then and now tells noise.
+    pub(super) fn before(&self, now: &State) -> Option<&State> {
+        self.earlier.iter().rev().find(|s| s.is_far_before(now))
+    }
+
+    /// mean(weight (x - limit)^2) over `pixels` and channels of the film that [`Self::measure`] saw last, `now`.
+    pub(super) fn estimate(&self, window: Window, now: &State, pixels: &[usize], weight: Weight<'_>) -> Estimate {
+        let value = now.noise(pixels, weight);
+        let width = self
+            .before(now)
+            .and_then(|before| Together::of(window, pixels, [before, now], weight))
+            .and_then(Together::log_width);
+        Estimate { value, interval: width.map(|w| [value * (-w).exp(), value * w.exp()]) }
     }
 
     /// What [`Self::measure`] said last.
@@ -230,13 +288,13 @@ impl Together {
 
 /// Degrees of freedom at the least: one block with most of what is shared looks like one, but that too is chance, and Student's
 /// factor for one is so large that it says nothing.
-const FEWEST_FREEDOM: f64 = 2.0;
+pub(super) const FEWEST_FREEDOM: f64 = 2.0;
 
 /// Blocks of 1, 2 and 4 times the side are tried: noise of the cache may be as wide as that, and the widest counts.
-const LEVELS: usize = 3;
+pub(super) const LEVELS: usize = 3;
 
 /// Wider blocks are not tried where they are fewer: what they say is mostly chance, and the widest of chances would count.
-const FEWEST_BLOCKS: usize = 9;
+pub(super) const FEWEST_BLOCKS: usize = 9;
 
 /// Sums over 2x2 blocks; `grid` is columns and rows before and after.
 fn four_to_one(blocks: &[f64], grid: &mut [usize; 2]) -> Vec<f64> {
@@ -250,6 +308,6 @@ fn four_to_one(blocks: &[f64], grid: &mut [usize; 2]) -> Vec<f64> {
 }
 
 /// Side of the smallest blocks within which errors may go together [pixels]: smaller where the picture has few.
-fn block_side(window: Window) -> usize {
+pub(super) fn block_side(window: Window) -> usize {
     (((window.area() as f64).sqrt() / 8.0) as usize).clamp(4, BLOCK as usize)
 }

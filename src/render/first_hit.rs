@@ -28,6 +28,8 @@ pub enum Seen {
     /// the channel that decides. Means over what is translucent in the pixel; 0 without. See
     /// [`crate::bssrdf::expected_error`].
     Validity,
+    /// Share of the pixel where the camera meets a translucent object first, in all channels.
+    Translucent,
 }
 
 /// A picture of `what` for the pixels of `window`.
@@ -50,6 +52,11 @@ pub fn first_hit(view: View<'_>, window: Window, what: Seen) -> Image {
                 Some(Rgb(x.as_vec3().to_array()))
             }
             Seen::Depth => Some(Rgb::splat((ray.direction * hit.t).dot(camera.forward()))),
+            Seen::Translucent => {
+                let object = &view.scene.objects[hit.mesh as usize];
+                let translucent = matches!(view.scene.materials[object.material].surface, Surface::Translucent(_));
+                translucent.then(|| Rgb::splat(1.0))
+            }
             Seen::Validity => validity(view, shapes[hit.mesh as usize].as_ref()?, &hit),
         }
     };

@@ -1,4 +1,7 @@
-//! Error of one way to render while it runs: points, slopes, what it flattens at.
+//! Error of one way to render while it runs: points, slopes, when it had an error.
+
+use crate::film::metrics::{Estimate, student_975};
+use crate::film::{Judged, Judgement, SelfErrors};
 
 /// One way to render, measured while it ran.
 #[derive(Clone, Debug)]
@@ -18,13 +21,20 @@ pub struct Point {
     pub samples: u32,
     /// Time of rendering [s].
     pub seconds: f64,
-    /// relMSE against the reference as it is, the reference's own noise in it.
-    pub measured: f64,
-    /// relMSE against its own limit, told by its halves; none before each half has a pass.
-    pub own: Option<f64>,
-    /// Half of the 95 % interval of log(error / told error).
-    pub width: Option<f64>,
+    /// Over all pixels, and without the worst 0.1 %, by which methods are judged.
+    pub judgement: Judgement,
+    /// What the render tells of itself, as in its records.
+    pub told: Option<SelfErrors>,
 }
+
+/// Which pixels of a point.
+pub(super) type Set = fn(&Point) -> &Judged;
+
+/// All of them.
+pub(super) const ALL: Set = |p| &p.judgement.all;
+
+/// Those that are judged by.
+pub(super) const TRIMMED: Set = |p| &p.judgement.trimmed;
 
 /// log(error) = intercept + slope log(x), by least squares.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,53 +47,31 @@ pub struct Fit {
     pub half_width: f64,
 }
 
-/// What a curve tends to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Floor {
-    /// relMSE that does not go away with samples.
-    pub value: f64,
-    /// Half of its 95 % interval.
-    pub half_width: f64,
-}
-
-impl Floor {
-    /// Whether it is told from none.
-    pub fn is_seen(&self) -> bool {
-        self.value > self.half_width
-    }
-}
-
-impl Point {
-    /// relMSE against what the reference stands for: the reference's noise is independent, so its square is taken off.
-    /// None where it is not told from that noise.
-    pub fn error(&self, noise: f64) -> Option<f64> {
-        let error = self.measured - noise;
-        (error > 0.3 * noise && error > 0.0).then_some(error)
-    }
-}
-
 impl Fit {
-    /// Over (x, error) in ascending order of x. Errors of a growing mean go together, so the residuals count as one for
-    /// each doubling of x. None with fewer than two and a half doublings.
-    pub fn of(points: &[(f64, f64)]) -> Option<Self> {
-        let logs: Vec<(f64, f64)> = points.iter().map(|&(x, y)| (x.ln(), y.ln())).collect();
+    /// Over (x, error, half of the 95 % interval of its logarithm) in ascending order of x. Errors of a growing mean go
+    /// together, so the residuals count as one for each doubling of x, and they are not believed to be smaller than the
+    /// intervals say. None with fewer than two and a half doublings.
+    pub fn of(points: &[(f64, f64, f64)]) -> Option<Self> {
+        let logs: Vec<(f64, f64, f64)> = points.iter().map(|&(x, y, w)| (x.ln(), y.ln(), w)).collect();
         let doublings = (logs.last()?.0 - logs.first()?.0) / std::f64::consts::LN_2;
         if doublings < 2.5 || logs.len() < 4 {
             return None;
         }
         // Equal weight to equal ratios of x, however close the measurements are.
         let weight = |i: usize| (logs[(i + 1).min(logs.len() - 1)].0 - logs[i.saturating_sub(1)].0) / 2.0;
-        let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 {
-            logs.iter().enumerate().map(|(i, &(x, y))| weight(i) * f(x, y)).sum()
+        let sum = |f: &dyn Fn(f64, f64, f64) -> f64| -> f64 {
+            logs.iter().enumerate().map(|(i, &(x, y, w))| weight(i) * f(x, y, w)).sum()
         };
-        let all = sum(&|_, _| 1.0);
-        let (mx, my) = (sum(&|x, _| x) / all, sum(&|_, y| y) / all);
-        let spread = sum(&|x, _| (x - mx).powi(2));
-        let slope = sum(&|x, y| (x - mx) * (y - my)) / spread;
-        let residual = sum(&|x, y| (y - my - slope * (x - mx)).powi(2)) / all;
+        let all = sum(&|_, _, _| 1.0);
+        let (mx, my) = (sum(&|x, _, _| x) / all, sum(&|_, y, _| y) / all);
+        let spread = sum(&|x, _, _| (x - mx).powi(2));
+        let slope = sum(&|x, y, _| (x - mx) * (y - my)) / spread;
+        let residual = sum(&|x, y, _| (y - my - slope * (x - mx)).powi(2)) / all;
+        // The intervals are for the ratio of two errors that are alike uncertain.
+        let told = sum(&|_, _, w| (w / 2.0 / std::f64::consts::SQRT_2).powi(2)) / all;
         let freedom = doublings + 1.0 - 2.0;
-        let error = (residual / freedom / (spread / all)).sqrt();
-        let student = crate::film::metrics::student_975(freedom.max(1.0) as usize);
+        let error = (residual.max(told) / freedom / (spread / all)).sqrt();
+        let student = student_975(freedom.max(1.0) as usize);
         Some(Self { intercept: my - slope * mx, slope, half_width: student * error })
     }
 
@@ -104,9 +92,6 @@ pub enum Reached {
     Never,
 }
 
-/// Told noise is not believed to better than this share.
-const LEAST_WIDTH: f64 = 0.3;
-
 /// Passes before these are left out of fits: sequences begin before they spread.
 const SETTLED: u32 = 2;
 
@@ -117,88 +102,117 @@ const STEADY: f64 = 1.3;
 const CONTINUED: f64 = 1.5;
 
 impl Curve {
-    /// (x, error) of the points that are told from the reference's `noise`.
-    pub(super) fn line(&self, noise: f64, x: impl Fn(&Point) -> f64) -> Vec<(f64, f64)> {
-        self.points.iter().filter_map(|p| Some((x(p), p.error(noise)?))).collect()
+    /// (x, error, half of the interval of its logarithm) of the points that are told from the noise of the reference.
+    fn line(&self, x: impl Fn(&Point) -> f64) -> Vec<(f64, f64, f64)> {
+        let told = |p: &&Point| p.judgement.trimmed.is_told();
+        let one = |p: &Point| (x(p), p.judgement.trimmed.error().value, p.judgement.trimmed.width.unwrap_or(0.0));
+        self.points.iter().filter(told).map(one).collect()
     }
 
     /// Fit of the error against `x` from the second sample on.
-    pub(super) fn fit(&self, noise: f64, x: impl Fn(&Point) -> f64) -> Option<Fit> {
-        let points = self.points.iter().filter(|p| p.samples >= SETTLED);
-        Fit::of(&points.filter_map(|p| Some((x(p), p.error(noise)?))).collect::<Vec<_>>())
+    pub(super) fn fit(&self, x: impl Fn(&Point) -> f64) -> Option<Fit> {
+        let first = self.points.iter().find(|p| p.samples >= SETTLED).map(&x)?;
+        let line = self.line(x);
+        Fit::of(&line.into_iter().filter(|p| p.0 >= first).collect::<Vec<_>>())
     }
 
     /// The width of each point as it is drawn: the median over the points around. A width is itself an estimate, of one
     /// picture, and now and then far off.
-    pub(super) fn steady_widths(&self) -> Vec<Option<f64>> {
+    pub(super) fn steady_widths(&self, set: Set) -> Vec<Option<f64>> {
         let at = |p: &Point| {
             let near = |q: &&Point| {
                 let ratio = f64::from(q.samples) / f64::from(p.samples);
                 (1.0 / STEADY..=STEADY).contains(&ratio)
             };
-            let mut widths: Vec<f64> = self.points.iter().filter(near).filter_map(|q| q.width).collect();
+            let mut widths: Vec<f64> = self.points.iter().filter(near).filter_map(|q| set(q).width).collect();
             widths.sort_by(f64::total_cmp);
-            p.width.map(|_| widths[widths.len() / 2])
+            set(p).width.map(|_| widths[widths.len() / 2])
         };
         self.points.iter().map(at).collect()
     }
 
+    /// Seconds and error of each point; its width is its own or that of the points around, whichever is larger.
+    pub(super) fn errors(&self, set: Set) -> Vec<(f64, Estimate)> {
+        let one = |(p, steady): (&Point, Option<f64>)| {
+            let own = set(p);
+            let width = own.width.zip(steady).map(|(w, steady)| w.max(steady));
+            (p.seconds, Judged { width, ..*own }.error())
+        };
+        self.points.iter().zip(self.steady_widths(set)).map(one).collect()
+    }
+
     /// The error after `seconds`: on straight lines between the logarithms, beyond the last point by 1 / time. None
     /// before the first, or far beyond the last.
-    pub fn error_at(&self, seconds: f64, noise: f64) -> Option<f64> {
-        let line = self.line(noise, |p| p.seconds);
-        let (first, last) = (line.first()?, line.last()?);
+    pub(super) fn error_at(&self, seconds: f64, set: Set) -> Option<Estimate> {
+        let errors = self.errors(set);
+        let (first, last) = (errors.first()?, errors.last()?);
         if seconds < first.0 || seconds > CONTINUED * last.0 {
             return None;
         }
-        let next = line.iter().position(|p| p.0 >= seconds);
-        Some(match next {
-            None => last.1 * last.0 / seconds,
-            Some(0) => first.1,
-            Some(i) => {
-                let (a, b) = (line[i - 1], line[i]);
-                let share = (seconds / a.0).ln() / (b.0 / a.0).ln();
-                (a.1.ln() + share * (b.1 / a.1).ln()).exp()
+        let read = |of: &dyn Fn(&Estimate) -> Option<f64>| -> Option<f64> {
+            match errors.iter().position(|p| p.0 >= seconds) {
+                None => Some(of(&last.1)? * last.0 / seconds),
+                Some(0) => of(&first.1),
+                Some(i) => {
+                    let (a, b) = (&errors[i - 1], &errors[i]);
+                    Some(between((a.0, of(&a.1)?), (b.0, of(&b.1)?), seconds))
+                }
             }
-        })
+        };
+        let end = |k: usize| read(&|e: &Estimate| e.interval.map(|ends| ends[k]));
+        Some(Estimate { value: read(&|e| Some(e.value))?, interval: end(0).zip(end(1)).map(|(low, high)| [low, high]) })
     }
 
-    /// When the curve first was down to `error`.
-    pub fn reached(&self, error: f64, noise: f64) -> Reached {
-        let line = self.line(noise, |p| p.seconds);
-        match line.iter().position(|p| p.1 <= error) {
+    /// When the curve first was down to `error`, by the lower (0) or upper (1) end of its interval.
+    pub(super) fn reached(&self, error: f64, end: usize) -> Reached {
+        let ends: Vec<(f64, f64)> =
+            self.errors(TRIMMED).iter().filter_map(|(s, e)| Some((*s, e.interval?[end]))).collect();
+        match ends.iter().position(|p| p.1 <= error) {
             None => Reached::Never,
-            Some(0) => Reached::Before(line[0].0),
-            Some(i) => {
-                let (a, b) = (line[i - 1], line[i]);
-                let share = (error / a.1).ln() / (b.1 / a.1).ln();
-                Reached::At((a.0.ln() + share * (b.0 / a.0).ln()).exp())
-            }
+            Some(0) => Reached::Before(ends[0].0),
+            Some(i) => Reached::At(between((ends[i - 1].1, ends[i - 1].0), (ends[i].1, ends[i].0), error)),
         }
-    }
-
-    /// What is left of the last error when its own noise and the reference's are taken off.
-    pub fn floor(&self, noise: f64) -> Option<Floor> {
-        let last = self.points.last()?;
-        let own = last.own?;
-        let value = last.measured - noise - own;
-        // Told noise, the reference's noise, and the product of bias and noise, each known to some share; told noise has an
-        // error of its own while it is large, so that less than 0.3 of it is never called bias.
-        let width = last.width.unwrap_or(1.0).max(LEAST_WIDTH);
-        let parts = [width * own, 0.3 * noise, width * (value.max(0.0) * own).sqrt()];
-        Some(Floor { value, half_width: parts.iter().map(|p| p * p).sum::<f64>().sqrt() })
     }
 }
 
+/// The value at x of the straight line between the logarithms of two points (x, y), or of x alone where there are zeros.
+fn between(a: (f64, f64), b: (f64, f64), x: f64) -> f64 {
+    let (xs, ys) = (a.0 > 0.0 && b.0 > 0.0, a.1 > 0.0 && b.1 > 0.0);
+    let share = if xs { (x / a.0).ln() / (b.0 / a.0).ln() } else { (x - a.0) / (b.0 - a.0) };
+    if ys { (a.1.ln() + share * (b.1 / a.1).ln()).exp() } else { a.1 + share * (b.1 - a.1) }
+}
+
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
+    use crate::film::Bias;
+
+    /// Noise `own`, bias `bias`, reference noise 1e-6, all known to `width`.
+    pub fn judged(own: Option<f64>, bias: f64, width: f64) -> Judged {
+        let half_width = own.unwrap_or(0.0) * (f64::exp(width.max(0.3)) - 1.0);
+        Judged {
+            pixels: 10_000,
+            measured: own.unwrap_or(0.1) + bias + 1e-6,
+            reference_noise: 1e-6,
+            reference_width: 0.3,
+            noise: own,
+            width: own.map(|_| width),
+            bias: own.map(|_| Bias { value: bias, half_width }),
+            worst_share: 0.01,
+            worst_pixel: [3, 4],
+        }
+    }
 
     fn curve(floor: f64, slope: f64) -> Curve {
         let point = |samples: u32| {
             let own = 0.1 * f64::from(samples).powf(slope);
-            let measured = own + floor + 1e-6;
-            Point { samples, seconds: 0.1 * f64::from(samples), measured, own: Some(own), width: Some(0.1) }
+            let judged = judged(Some(own), floor, 0.1);
+            Point {
+                samples,
+                seconds: 0.1 * f64::from(samples),
+                judgement: Judgement { all: judged, trimmed: judged },
+                told: None,
+            }
         };
         Curve { name: "c".into(), seconds_setup: 0.1, points: (1..200).map(point).collect() }
     }
@@ -206,49 +220,51 @@ mod tests {
     #[test]
     fn slopes_are_those_put_in() {
         let samples = |p: &Point| f64::from(p.samples);
-        let fit = curve(0.0, -1.0).fit(1e-6, samples).unwrap();
-        assert!((fit.slope + 1.0).abs() < 1e-6 && fit.half_width < 1e-6, "{fit:?}");
+        let fit = curve(0.0, -1.0).fit(samples).unwrap();
+        assert!((fit.slope + 1.0).abs() < 1e-6, "{fit:?}");
         assert!((fit.at(10.0) / 0.01 - 1.0).abs() < 1e-6);
-        let biased = curve(5e-3, -1.0).fit(1e-6, samples).unwrap();
+        let biased = curve(5e-3, -1.0).fit(samples).unwrap();
         assert!(biased.slope > -0.8, "{biased:?}");
-        assert!(Fit::of(&[(1.0, 1.0), (2.0, 0.5)]).is_none(), "too few doublings");
+        assert!(Fit::of(&[(1.0, 1.0, 0.1), (2.0, 0.5, 0.1)]).is_none(), "too few doublings");
+    }
+
+    /// Points on a line fit it without a residual; that does not make the slope exact.
+    #[test]
+    fn a_slope_is_not_surer_than_its_points() {
+        let fit = |w: f64| Fit::of(&(1..=64).map(|n| (f64::from(n), 1.0 / f64::from(n), w)).collect::<Vec<_>>());
+        let (sure, unsure) = (fit(0.0).unwrap(), fit(1.0).unwrap());
+        assert!(sure.half_width < 1e-6, "{sure:?}");
+        // Errors of sigma = 1 / (2 sqrt 2) at 6 doublings with 5 degrees of freedom, spread of ln x about 1: some 0.4.
+        assert!((0.2..0.8).contains(&unsure.half_width), "{unsure:?}");
     }
 
     #[test]
-    fn bias_is_told_from_noise() {
-        let [fair, biased] = [0.0, 5e-3].map(|floor| curve(floor, -1.0).floor(1e-6).unwrap());
-        assert!(!fair.is_seen() && fair.value.abs() < 1e-9, "{fair:?}");
-        assert!(biased.is_seen() && (biased.value / 5e-3 - 1.0).abs() < 1e-6, "{biased:?}");
-    }
-
-    #[test]
-    fn a_width_that_is_far_off_is_not_drawn() {
+    fn a_width_that_is_far_off_is_not_drawn_but_said() {
         let mut curve = curve(0.0, -1.0);
-        curve.points[100].width = Some(3.0);
-        curve.points[0].width = None;
-        let drawn = curve.steady_widths();
+        curve.points[100].judgement.trimmed.width = Some(3.0);
+        curve.points[0].judgement.trimmed.width = None;
+        let drawn = curve.steady_widths(TRIMMED);
         assert_eq!((drawn[0], drawn[1], drawn[100]), (None, Some(0.1), Some(0.1)));
+        let errors = curve.errors(TRIMMED);
+        let factor = |e: Estimate| e.interval.map(|[_, high]| high / e.value);
+        assert!(factor(errors[100].1).unwrap() > 20.0 && factor(errors[101].1).unwrap() < 1.2);
     }
 
     #[test]
     fn a_curve_is_read_between_its_points() {
         let curve = curve(0.0, -1.0);
         // The error is 0.01 / seconds; the points are 0.1 s apart from 0.1 s to 19.9 s.
-        assert!((curve.error_at(1.234, 1e-6).unwrap() * 123.4 - 1.0).abs() < 1e-6);
-        assert!((curve.error_at(25.0, 1e-6).unwrap() * 2500.0 - 1.0).abs() < 1e-6, "by 1 / time");
-        assert_eq!((curve.error_at(0.05, 1e-6), curve.error_at(50.0, 1e-6)), (None, None));
-        let Reached::At(seconds) = curve.reached(3.21e-3, 1e-6) else { panic!("within the curve") };
-        assert!((seconds * 0.321 - 1.0).abs() < 1e-6);
-        assert_eq!(curve.reached(0.2, 1e-6), Reached::Before(0.1));
-        assert_eq!(curve.reached(1e-5, 1e-6), Reached::Never);
-    }
-
-    #[test]
-    fn a_point_below_the_noise_of_the_reference_has_no_error() {
-        let point = Point { samples: 1, seconds: 1.0, measured: 1.1e-3, own: None, width: None };
-        assert_eq!(point.error(1e-3), None);
-        assert!(point.error(1e-4).is_some());
-        let one = Curve { name: "c".into(), seconds_setup: 0.0, points: vec![point] };
-        assert_eq!(one.floor(1e-4), None, "one pass tells no noise");
+        let at = |s: f64| curve.error_at(s, TRIMMED);
+        let one = at(1.234).unwrap();
+        assert!((one.value * 123.4 - 1.0).abs() < 1e-6);
+        let [low, high] = one.interval.unwrap();
+        // Of 8.1e-3 / 10 +- 10 %, and what the noise of the reference adds: sqrt(8.1e-3 1e-6) 0.1.
+        assert!((low / one.value - 0.905).abs() < 0.005 && (high / one.value - 1.105).abs() < 0.005, "{one:?}");
+        assert!((at(25.0).unwrap().value * 2500.0 - 1.0).abs() < 1e-6, "by 1 / time");
+        assert_eq!((at(0.05), at(50.0)), (None, None));
+        let Reached::At(seconds) = curve.reached(3.21e-3 * 0.1_f64.exp(), 1) else { panic!("within the curve") };
+        assert!((seconds * 0.321 - 1.0).abs() < 0.01, "{seconds}");
+        assert_eq!(curve.reached(0.2, 1), Reached::Before(0.1));
+        assert_eq!(curve.reached(1e-5, 0), Reached::Never);
     }
 }

@@ -29,6 +29,7 @@ const STYLE: &str = "
 body{margin:0;background:var(--back);color:var(--ink);font:16px/1.5 Helvetica,Arial,'Liberation Sans',sans-serif}
 main{max-width:1280px;margin:0 auto;padding:24px 20px 48px}
 h1{font-size:1.6rem;margin:.2em 0 .5em}h2{font-size:1.15rem;margin:1.8em 0 .6em}
+.remarks{margin:.6em 0 1em;padding:8px 14px 8px 32px;max-width:88ch;background:var(--card);border:1px solid var(--line);border-left:4px solid #b7791f;border-radius:6px;overflow-wrap:anywhere}
 p{margin:.4em 0;max-width:80ch}.lead{font-size:1.1rem}
 .figures{display:flex;flex-wrap:wrap;gap:16px}
 .figures>div{flex:1 1 420px;background:#fff;border:1px solid var(--line);border-radius:6px;padding:6px;min-width:0}
@@ -62,6 +63,18 @@ impl Page {
     pub fn lead(&mut self, sentences: &[String]) -> &mut Self {
         for sentence in sentences {
             let _ = writeln!(self.body, "<p class=\"lead\">{}</p>", escape(sentence));
+        }
+        self
+    }
+
+    /// What a reader must know before the numbers: warnings of the scene, light not met, paths lost. Nothing where there are none.
+    pub fn remarks(&mut self, remarks: &[String]) -> &mut Self {
+        if !remarks.is_empty() {
+            self.body.push_str("<ul class=\"remarks\">\n");
+            for remark in remarks {
+                let _ = writeln!(self.body, "<li>{}</li>", escape(remark));
+            }
+            self.body.push_str("</ul>\n");
         }
         self
     }
@@ -182,5 +195,8 @@ mod tests {
         let html = page.to_html();
         assert!(!html.contains("<script>") && html.contains("&lt;script&gt;") && html.contains("a&lt;b&gt;&amp;"));
         assert!(!html.contains("http"), "nothing is fetched");
+        assert!(!html.contains("<ul"), "no remarks, no list");
+        page.remarks(&["2 < 3 paths lost".into()]);
+        assert!(page.to_html().contains("<li>2 &lt; 3 paths lost</li>"));
     }
 }

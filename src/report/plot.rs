@@ -69,6 +69,11 @@ pub enum Stroke {
         /// SVG `stroke-dasharray`.
         dash: &'static str,
     },
+    /// A thin pale line, for what stands beside the judgement.
+    Thin {
+        /// CSS colour.
+        colour: &'static str,
+    },
     /// The area between two curves, half transparent.
     Band {
         /// CSS colour.
@@ -205,6 +210,9 @@ impl Figure {
                         y - 4.5
                     );
                 }
+                Stroke::Thin { colour } => {
+                    let _ = writeln!(body, "<path d=\"M{x:.1} {:.1}h34\" stroke=\"{colour}\"/>", y - 4.5);
+                }
                 Stroke::Band { colour } => {
                     let _ = writeln!(
                         body,
@@ -302,7 +310,15 @@ impl Panel {
 impl Series {
     fn draw(&self, body: &mut String, px: &dyn Fn(f64) -> Option<f64>, py: &dyn Fn(f64) -> Option<f64>) {
         match self.stroke {
-            Stroke::Line { colour, dash } => {
+            Stroke::Line { .. } | Stroke::Thin { .. } => {
+                let (colour, look) = match self.stroke {
+                    Stroke::Line { colour, dash } => {
+                        (colour, format!("stroke-width=\"2\" stroke-dasharray=\"{dash}\""))
+                    }
+                    Stroke::Thin { colour } | Stroke::Band { colour } | Stroke::Points { colour } => {
+                        (colour, "stroke-width=\"1\" stroke-opacity=\"0.6\"".into())
+                    }
+                };
                 let (mut path, mut pen_down) = (String::new(), false);
                 for &(x, y, _) in &self.points {
                     let Some((x, y)) = px(x).zip(py(y)) else {
@@ -316,7 +332,7 @@ impl Series {
                 }
                 let _ = writeln!(
                     body,
-                    "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" stroke-dasharray=\"{dash}\" stroke-linejoin=\"round\"/>"
+                    "<path d=\"{path}\" fill=\"none\" stroke=\"{colour}\" {look} stroke-linejoin=\"round\"/>"
                 );
             }
             Stroke::Band { colour } => {
