@@ -174,6 +174,13 @@ impl<'a> Runner<'a> {
         Ok(())
     }
 
+    /// What there is to say of lost paths, if they are more than rounding explains; for the page and for the log.
+    fn lost(&self) -> Vec<String> {
+        let name = &self.entrant.name;
+        let said = self.tally.walk.lost(&self.entrant.prepared.scene);
+        if self.tally.walk.lost_many() { said.iter().map(|s| format!("{name}: {s}.")).collect() } else { Vec::new() }
+    }
+
     /// The errors as they are now.
     pub fn measure(&mut self, truth: &Truth) -> Result<ErrorPoint> {
         let judgement = judge(&self.film, &mut self.own, truth, None)?;
@@ -186,24 +193,18 @@ impl<'a> Runner<'a> {
     /// What must be known of this render before its figures: samples left out, paths lost, warnings of its scene. Whatever a
     /// run reports beside numbers goes here, and so to the top of the page and of the text.
     pub fn remarks(&self) -> Vec<String> {
-        let (name, counts, gather, walk) =
-            (&self.entrant.name, self.film.counts(), &self.tally.gather, &self.tally.walk);
+        let (name, counts, gather) = (&self.entrant.name, self.film.counts(), &self.tally.gather);
         let causes = [
             (counts.non_finite, "samples are not finite and were left out"),
             (gather.non_finite, "cached samples are not finite and were left out"),
             (counts.negative, "samples are below zero"),
         ];
         let counted = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{name}: {n} {what}"));
-        let lost = (walk.lost as f64 > MOST_LOST * walk.walks as f64).then(|| {
-            format!("{name}: {} of {} paths inside bodies were lost and carry nothing", walk.lost, walk.walks)
-        });
+        let lost = self.lost();
         let warnings = self.entrant.prepared.scene.warnings.iter().map(ToString::to_string);
         counted.chain(lost).chain(warnings).collect()
     }
 }
-
-/// Share of the paths inside bodies that may be lost without a remark.
-const MOST_LOST: f64 = 1e-3;
 
 /// What films are held against.
 pub struct Reference {

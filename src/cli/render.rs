@@ -13,6 +13,7 @@ use marmor::integrator::{Integrator, Part, View};
 use marmor::query;
 use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
 use marmor::report::RecordFile;
+use marmor::scene::Scene;
 use marmor::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -66,7 +67,8 @@ pub struct Args {
     /// Write what was built, what it cost and how fast it went
     #[arg(long, value_name = "JSON")]
     stats: Option<PathBuf>,
-    /// Exit with code 5 if any contribution was not finite, negative, clamped or dropped; the pictures are written
+    /// Exit with code 5 if any contribution was not finite, negative, clamped or dropped, or more than 0.1 % of the paths in bodies
+    /// were lost; the pictures are written
     #[arg(long)]
     strict: bool,
     /// Print one sample of this pixel and what it meets, instead of rendering; see --pass
@@ -187,9 +189,13 @@ pub fn run(args: Args) -> Result<ExitCode> {
         }
         let kept = keeper.finish(finished.stop, &film, &spent)?;
         let odd = odd(&film, &spent).map(|cause| (cause, replay_line(&args, &film, prepared.seed)));
-        task.tell(&finished, &film, &outputs.paths, kept, odd.as_ref())?;
+        task.tell(scene, &finished, &film, &outputs.paths, kept, odd.as_ref())?;
         if let Some((cause, replay)) = odd.filter(|_| args.strict) {
             return Err(Error::new(ErrorKind::Numeric, format!("--strict: {cause}; to look at one: {replay}")));
+        }
+        if args.strict && spent.tally.walk.lost_many() {
+            let lost = spent.tally.walk.lost(scene).join("; ");
+            return Err(Error::new(ErrorKind::Numeric, format!("--strict: {lost}")));
         }
         Ok(if finished.stop == Stop::Cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
     })
@@ -259,6 +265,7 @@ impl Task<'_> {
     /// What came out, in a few lines.
     fn tell(
         &self,
+        scene: &Scene,
         outcome: &Outcome,
         film: &Film,
         outputs: &[PathBuf],
@@ -292,19 +299,17 @@ impl Task<'_> {
                 .map_or(" (interval unknown)".into(), |[low, high]| format!(" (95 %: {low:.4e} to {high:.4e})"));
             eprintln!("against the reference: RMSE {:.4e}{relative}{interval}", e.rmse);
         }
-        if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 {
+        // Where a lamp is inside or a mesh has no inside, the warnings before have said why.
+        if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 && scene.obstacles().is_empty() {
             eprintln!(
                 "warning: none of {} samples on translucent surfaces met any light: do the lights face them? (a light \
                  shines along its outward normal; `two_sided = true` lets it shine both ways)",
                 outcome.tally.gather.samples
             );
         }
-        let (lost, walks) = (outcome.tally.walk.lost, outcome.tally.walk.walks);
-        if lost > 0 {
-            eprintln!(
-                "{lost} of {walks} paths inside bodies were lost: they met a hole of a mesh, the wrong side of a face or another \
-                 medium, or rounding put them there; they carry nothing"
-            );
+        let level = if outcome.tally.walk.lost_many() { "warning: " } else { "" };
+        for sentence in outcome.tally.walk.lost(scene) {
+            eprintln!("{level}{sentence}");
         }
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         eprintln!("wrote {}", names.join(", "));

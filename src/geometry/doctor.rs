@@ -139,7 +139,7 @@ pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
 }
 
 /// For each vertex the first one at the same place.
-fn welded(count: usize, point: impl Fn(u32) -> DVec3) -> Vec<u32> {
+pub(super) fn welded(count: usize, point: impl Fn(u32) -> DVec3) -> Vec<u32> {
     // + 0.0 makes -0 and 0 one place.
     let mut order: Vec<([u64; 3], u32)> =
         (0..count as u32).map(|i| (point(i).to_array().map(|x| (x + 0.0).to_bits()), i)).collect();

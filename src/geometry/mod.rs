@@ -2,7 +2,9 @@
 //! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area.
 
 mod area_table;
+mod box_tree;
 mod clearance;
+mod contact;
 mod curvature;
 mod doctor;
 mod mesh;
@@ -14,10 +16,13 @@ mod obj_remarks;
 mod polygon;
 mod polygon_fill;
 mod shapes;
+mod solid;
 mod weld;
+mod winding;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
+pub use contact::{Contact, Meeting, Seek, meeting};
 pub use curvature::Curvature;
 pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, Precision, SurfacePoint};
@@ -25,4 +30,5 @@ pub use morton::morton_code;
 pub use obj::{LOADING_BYTES, load_obj, write_obj};
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};
+pub use solid::{Part, Seams, Solid};
 pub use weld::Seam;

@@ -5,6 +5,7 @@ mod ambient_occlusion;
 mod direct;
 mod first_order;
 mod local;
+mod losses;
 mod shade;
 mod single;
 mod subsurface;
@@ -16,11 +17,12 @@ use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray, RayQuery, RayTally};
 use crate::sampling::PixelStream;
-use crate::scene::Scene;
+use crate::scene::{Obstacle, Scene};
 pub use ambient_occlusion::AmbientOcclusion;
 pub use direct::Direct;
 pub use first_order::FirstOrder;
 pub use local::{Local, LocalShape};
+pub use losses::{Cause, Loss, Losses, TOLERATED};
 pub use subsurface::{Subsurface, SubsurfaceOptions};
 pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness};
 pub use volume_path::{Left, VolumePath, VolumePathOptions};
@@ -78,7 +80,7 @@ pub struct Tally {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct WalkTally {
-    /// Stays of a path in a body.
+    /// Stays of a path in a body, those included that ended before they began.
     pub walks: u64,
     /// Collisions.
     pub collisions: u64,
@@ -92,8 +94,26 @@ pub struct WalkTally {
     pub vertices: u64,
     /// Kept collisions looked at from camera paths.
     pub connections: u64,
-    /// Paths that met a hole of a mesh, the wrong side of a face, or another medium inside a body: they carry nothing.
-    pub lost: u64,
+    /// Paths that came where no light can be, by object and cause: they carry nothing.
+    pub losses: Losses,
+}
+
+impl WalkTally {
+    /// What there is to say of lost paths, a sentence for each object and cause.
+    pub fn lost(&self, scene: &Scene) -> Vec<String> {
+        self.losses.sentences(scene, self.walks)
+    }
+
+    /// Whether more paths were lost than [`TOLERATED`].
+    pub fn lost_many(&self) -> bool {
+        self.losses.are_many(self.walks)
+    }
+}
+
+/// What `volume_path` refuses to trace in a scene, each with the objects' names and a sentence ([`Obstacle::refusal`]); empty where it can
+/// be recommended. Meshes with small holes are traced with a warning.
+pub fn traceable(scene: &Scene) -> Vec<Obstacle> {
+    scene.obstacles().iter().filter(|o| o.refusal().is_some()).cloned().collect()
 }
 
 impl std::ops::AddAssign for WalkTally {
@@ -105,7 +125,7 @@ impl std::ops::AddAssign for WalkTally {
         self.photons += other.photons;
         self.vertices += other.vertices;
         self.connections += other.connections;
-        self.lost += other.lost;
+        self.losses += other.losses;
     }
 }
 

@@ -7,7 +7,7 @@ use std::rc::Rc;
 use super::file::{FovAxis, SceneFile, unit_vector};
 use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
-use super::{Camera, Material, Object, Scene, Surface, Translucent, precision, warnings};
+use super::{Camera, Insides, Material, Object, Scene, Surface, Translucent, precision, warnings};
 use crate::error::{Error, Result};
 use crate::geometry::{LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere};
 use crate::math::{DVec3, Vec3};
@@ -45,7 +45,8 @@ impl Scene {
                 return Err(Error::scene(format!("{}: {what}; use a larger `unit` or a smaller `scale`", entry.at)));
             }
             let findings = examine(&mesh);
-            objects.push(Object { name: entry.name.clone(), mesh, material: entry.material, findings });
+            let (name, at) = (entry.name.clone(), entry.at.clone());
+            objects.push(Object { name, mesh, at, material: entry.material, findings });
         }
         let mut scene = Self {
             name: file.path.display().to_string(),
@@ -57,6 +58,7 @@ impl Scene {
             environment,
             why_double: None,
             warnings: Vec::new(),
+            insides: Insides::default(),
         };
         let traced = file.method.name == Some(MethodName::VolumePath);
         let single = file.method.single != Some(false);
@@ -71,6 +73,11 @@ impl Scene {
             scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
         }
         scene.why_double = choice.why_double;
+        // The gap between two surfaces depends on what rays are traced in.
+        let method = file.method.name.unwrap_or_else(|| scene.default_method());
+        if matches!(method, MethodName::Subsurface | MethodName::VolumePath) {
+            said.extend(scene.obstacles().iter().filter_map(|o| o.warning(method)));
+        }
         scene.warnings = said;
         Ok(scene)
     }

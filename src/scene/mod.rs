@@ -10,6 +10,7 @@ mod file;
 mod load;
 mod materials;
 mod objects;
+mod obstacles;
 mod options;
 mod precision;
 mod tree;
@@ -22,6 +23,7 @@ pub use environment::{Environment, EnvironmentEntry};
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
+pub use obstacles::{Insides, Obstacle, ObstacleKind};
 pub use options::{
     EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
 };

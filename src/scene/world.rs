@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Camera, Environment, Remark, doctor};
+use super::{Camera, Environment, Insides, Remark, doctor};
 use crate::bssrdf::{DirectionalDipole, Model, ModelName, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -28,6 +28,8 @@ pub struct Scene {
     pub why_double: Option<String>,
     /// Oddities a user should hear of, in order of the file.
     pub warnings: Vec<String>,
+    /// What is inside what, once somebody has asked.
+    pub insides: Insides,
 }
 
 /// A mesh with a material.
@@ -36,6 +38,8 @@ pub struct Object {
     pub name: String,
     /// The mesh in scene space.
     pub mesh: Mesh,
+    /// Where it stands in the scene file, for messages.
+    pub at: String,
     /// Index into [`Scene::materials`].
     pub material: usize,
     /// What is wrong with the mesh.

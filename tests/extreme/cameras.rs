@@ -1,19 +1,26 @@
 //! Cameras and pictures at the ends of what there is.
 
-use super::harness::{BASE, load, ok, refused, shots, with};
+use super::harness::{BASE, load, ok, refused, shots, warns, with};
 
 fn camera(from: &str, to: &str) -> marmor::Result<marmor::scene::Scene> {
     load(&with(&[(from, to)]))
 }
 
 #[test]
-fn a_camera_inside_a_body_ok() {
-    ok(&camera("position = [0, 1, 6]\nlook_at = [0, 0, 0]", "position = [0, 0, 0]\nlook_at = [0, 0, 1]").unwrap());
+fn a_camera_inside_a_body_warns() {
+    let scene =
+        camera("position = [0, 1, 6]\nlook_at = [0, 0, 0]", "position = [0, 0, 0]\nlook_at = [0, 0, 1]").unwrap();
+    warns(&scene, &["the camera stands inside object \"body\"", "black; take --method volume_path"]);
 }
 
 #[test]
-fn a_camera_on_a_surface_ok() {
-    ok(&camera("position = [0, 1, 6]", "position = [0, 0, 1]").unwrap());
+fn a_camera_on_a_surface_warns() {
+    let scene = camera("position = [0, 1, 6]", "position = [0, 0, 1]").unwrap();
+    warns(&scene, &["the camera stands in the surface of object \"body\"", "move it by more than"]);
+}
+
+#[test]
+fn a_camera_on_the_floor_ok() {
     ok(&camera("position = [0, 1, 6]\nlook_at = [0, 0, 0]", "position = [0, -1.5, 0]\nlook_at = [1, -1.5, 0]")
         .unwrap());
 }

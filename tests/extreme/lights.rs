@@ -56,18 +56,18 @@ fn radiance_beyond_single_precision_is_counted_ok() {
 }
 
 #[test]
-fn a_light_inside_a_body_ok() {
+fn a_light_inside_a_body_warns() {
     let text = with(&[(
         "centre = [0, 4, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 0, 1]",
         "centre = [0, 0, 0]\nedge_u = [0.2, 0, 0]\nedge_v = [0, 0, 0.2]",
     )]);
-    ok(&load(&text).unwrap());
+    warns(&load(&text).unwrap(), &["lamp \"lamp\" lies inside object \"body\"", "take --method volume_path"]);
 }
 
 #[test]
-fn a_light_through_a_body_ok() {
+fn a_light_through_a_body_warns() {
     let text = with(&[("centre = [0, 4, 0]", "centre = [0, 0.5, 0]")]);
-    ok(&load(&text).unwrap());
+    warns(&load(&text).unwrap(), &["lamp \"lamp\" lies partly inside object \"body\"", "take --method volume_path"]);
 }
 
 #[test]

@@ -209,19 +209,20 @@ fn duplicate_triangles_warns() {
 }
 
 #[test]
-fn coincident_bodies_ok() {
+fn coincident_bodies_warns() {
     let copy = format!("[[object]]\nname = \"copy\"\n{BALL}\n[[object]]\nname = \"floor\"");
-    ok(&load(&with(&[("[[object]]\nname = \"floor\"", &copy)])).unwrap());
+    let scene = load(&with(&[("[[object]]\nname = \"floor\"", &copy)])).unwrap();
+    warns(&scene, &["\"body\" and \"copy\" overlap", "light does not pass from one to the other"]);
 }
 
 #[test]
-fn intersecting_bodies_ok() {
+fn intersecting_bodies_warns() {
     let second = BALL.replace("centre = [0, 0, 0]", "centre = [0.7, 0.3, 0]");
     let text = with(&[(
         "[[object]]\nname = \"floor\"",
         &format!("[[object]]\nname = \"second\"\n{second}\n[[object]]\nname = \"floor\""),
     )]);
-    ok(&load(&text).unwrap());
+    warns(&load(&text).unwrap(), &["\"body\" and \"second\" overlap", "light does not pass from one to the other"]);
 }
 
 #[test]
@@ -284,7 +285,7 @@ fn an_open_mesh_warns() {
 
 #[test]
 fn an_edge_of_three_faces_ok() {
-    let fin = cube() + "v 0 2 0.8\nv 0 2 0.9\nf 7 8 9\nf 9 8 10\nf 10 8 7\nf 9 10 7\n";
+    let fin = cube() + "v 0 2 0.8\nv 0 2 0.9\nf 7 9 8\nf 9 10 8\nf 10 7 8\nf 9 7 10\n";
     let scene = body(&fin).unwrap();
     assert_eq!(scene.objects[0].findings.non_manifold_edges, 1);
     assert!(scene.remarks(&scene.objects[0]).iter().any(|r| r.text.contains("more than two triangles")));

@@ -8,7 +8,7 @@ use marmor::integrator::{Left, View, VolumePath, VolumePathOptions, WalkTally};
 use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::Medium;
 use marmor::query::{self, Backend, Ray, RayQuery};
-use marmor::scene::{Camera, Material, Object, Orders, Scene, Surface, Translucent};
+use marmor::scene::{Camera, Insides, Material, Object, Orders, Scene, Surface, Translucent};
 use std::ops::Range;
 
 /// Where beams enter.
@@ -78,7 +78,7 @@ impl Body {
                 ball(sphere(DVec3::ZERO, radius.into(), rings, 2 * rings))
             }
         };
-        let camera = Camera::new([1, 1], DVec3::ZERO, Vec3::NEG_Z, Vec3::Y, 1.0, 1.0).unwrap();
+        let camera = Camera::new([1, 1], DVec3::splat(-1e6), Vec3::NEG_Z, Vec3::Y, 1.0, 1.0).unwrap();
         let translucent = Translucent {
             medium,
             model: ModelName::Standard,
@@ -92,11 +92,18 @@ impl Body {
             unit_in_mm: None,
             centre: DVec3::ZERO,
             camera,
-            objects: vec![Object { name: "body".into(), mesh, material: 0, findings: Findings::default() }],
+            objects: vec![Object {
+                name: "body".into(),
+                at: String::new(),
+                mesh,
+                material: 0,
+                findings: Findings::default(),
+            }],
             materials: vec![Material { name: "body".into(), surface: Surface::Translucent(translucent) }],
             environment: Rgb::BLACK.into(),
             why_double: None,
             warnings: Vec::new(),
+            insides: Insides::default(),
         };
         Self { shape, scene }
     }

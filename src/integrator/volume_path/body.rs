@@ -5,10 +5,10 @@ use super::facets::Bend;
 use super::spectrum::{Coefficients, Spectrum};
 use super::through::Through;
 use crate::geometry::{Clearance, SurfacePoint};
-use crate::integrator::{View, WalkTally};
+use crate::integrator::{Cause, View, WalkTally};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium, reflect, reflectance, refract};
-use crate::query::Ray;
+use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::Surface;
 
@@ -28,6 +28,8 @@ pub struct Body {
     pub least_extinction: f32,
     /// Whether the medium goes on beyond the object's box: sheets and meshes with holes.
     pub endless: bool,
+    /// What a path on the wrong side of its surface is lost by.
+    pub leak: Cause,
     /// How lamps are asked for at collisions.
     pub through: Option<Through>,
     /// Collisions between two looks at the weight.
@@ -48,6 +50,9 @@ pub trait Watch {
     /// Light that travelled along `w` is scattered at `x`, by the path's weight `spectrum` (the collision's albedo is in
     /// it). `edge` is the straight flight from the collision before, if no surface lay between. False ends the path.
     fn collision(&mut self, x: DVec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool;
+
+    /// A lamp inside the body ends the path, which came to it along `w`.
+    fn lamp(&mut self, _hit: &Hit, _w: Vec3, _spectrum: &Spectrum) {}
 }
 
 /// Where and how a path left a body.
@@ -93,8 +98,10 @@ pub enum Flight {
     Boundary(SurfacePoint, f32),
     /// An opaque surface inside, with its albedo.
     Opaque(SurfacePoint, f32, Rgb),
-    /// A hole of the mesh, the wrong side of a face, or another medium.
-    Lost,
+    /// A lamp inside.
+    Lamp(Hit),
+    /// Where no light can be.
+    Lost(Cause),
 }
 
 impl Body {
@@ -113,6 +120,7 @@ impl Body {
             phase: HenyeyGreenstein { g: medium.g },
             clearance,
             endless: false,
+            leak: Cause::Rounding,
             through,
         }
     }
@@ -145,21 +153,26 @@ impl Body {
         tally.rays += 1;
         let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
             let x = from + w.as_dvec3() * f64::from(distance);
-            return if self.endless || self.clearance.at(x) >= 0.0 { Flight::Collision(x) } else { Flight::Lost };
+            return if self.endless || self.clearance.at(x) >= 0.0 {
+                Flight::Collision(x)
+            } else {
+                Flight::Lost(self.leak)
+            };
         };
         let object = &view.scene.objects[hit.mesh as usize];
         let at = object.mesh.point(hit.triangle, hit.u, hit.v);
         if hit.mesh == self.object {
-            return if at.n_geometric.dot(w) > 0.0 { Flight::Boundary(at, hit.t) } else { Flight::Lost };
+            return if at.n_geometric.dot(w) > 0.0 { Flight::Boundary(at, hit.t) } else { Flight::Lost(self.leak) };
         }
         match &view.scene.materials[object.material].surface {
             Surface::Diffuse { albedo } => Flight::Opaque(at.facing(-w), hit.t, *albedo),
-            Surface::Emissive { .. } | Surface::Translucent(_) => Flight::Lost,
+            Surface::Emissive { .. } => Flight::Lamp(hit),
+            Surface::Translucent(_) => Flight::Lost(Cause::OtherMedium),
         }
     }
 
     /// Follows light from `from`, inside, along `w` until it leaves; `None` where it is absorbed, ended by `watch`, or
-    /// lost: it met a hole of the mesh, the wrong side of a face, or another medium.
+    /// lost, which is counted with its cause.
     ///
     /// A path whose weight has fallen goes on with a chance in proportion to what is left, and is weighted by its
     /// inverse. There is no limit of bounces.
@@ -220,8 +233,13 @@ impl Body {
                     w = cosine_hemisphere(at.n_geometric, draws.pair());
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);
                 }
-                Flight::Lost => {
-                    tally.lost += 1;
+                Flight::Lamp(hit) => {
+                    spectrum.fly(hit.t);
+                    watch.lamp(&hit, w, spectrum);
+                    return None;
+                }
+                Flight::Lost(cause) => {
+                    tally.losses.add(self.object, cause);
                     return None;
                 }
             }

@@ -120,7 +120,7 @@ impl<'a> CameraPath<'a> {
                 self.left = None;
                 self.direct = self.other;
                 let body = self.method.bodies[hit.mesh as usize].as_ref()?;
-                if !self.faces(hit, direction) || self.other <= 0.0 {
+                if !self.faces(body, hit, direction) || self.other <= 0.0 {
                     return None;
                 }
                 let mu = -at.n_geometric.dot(direction);
@@ -135,11 +135,14 @@ impl<'a> CameraPath<'a> {
         }
     }
 
-    /// Whether a body is met from outside; the inner side of a face is a hole of its mesh, and counted.
-    pub fn faces(&mut self, hit: &Hit, direction: Vec3) -> bool {
+    /// Whether a body is met from outside; at the inner side of a face the path is lost, and counted.
+    pub fn faces(&mut self, body: &Body, hit: &Hit, direction: Vec3) -> bool {
         let n = self.view.scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
         let outside = n.dot(direction) < 0.0;
-        self.tally.walk.lost += u64::from(!outside);
+        if !outside {
+            self.tally.walk.walks += 1;
+            self.tally.walk.losses.add(body.object, body.leak);
+        }
         outside
     }
 
@@ -169,11 +172,16 @@ impl<'a> CameraPath<'a> {
 
     /// Through a body from `at`, refracted into `w`; the ray on which the path leaves it.
     pub fn inside(&mut self, body: &'a Body, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
+        self.through(body, at.leave(w), w)
+    }
+
+    /// Through a body from `from`, inside, along `w`; the ray on which the path leaves it.
+    pub fn through(&mut self, body: &'a Body, from: DVec3, w: Vec3) -> Option<Ray> {
         let (mut spectrum, mut draws) = (self.spectrum, self.draws.clone());
         let mut walks = WalkTally::default();
         let view = self.view;
         let mut watch = Gather { path: self, body };
-        let exit = body.walk(view, (at.leave(w), w), &mut spectrum, &mut draws, &mut watch, &mut walks);
+        let exit = body.walk(view, (from, w), &mut spectrum, &mut draws, &mut watch, &mut walks);
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let exit = exit?;
@@ -231,6 +239,14 @@ impl Watch for Gather<'_, '_> {
         }
         true
     }
+
+    /// Photons and points of lamps have no light from inside: it is met by chance alone, and is part of all other light.
+    fn lamp(&mut self, hit: &Hit, w: Vec3, spectrum: &Spectrum) {
+        let (path, body) = (&mut *self.path, self.body);
+        let light = spectrum.value(&body.medium) * emitted(path.view.scene, hit, w);
+        // Radiance falls by η² on its way out.
+        path.add(light * (path.other / (body.eta * body.eta)));
+    }
 }
 
 impl Orders {
@@ -256,7 +272,7 @@ impl Orders {
 
 /// Both parts of what the camera sees on a body: the mirror image of what is around it, and the light from inside.
 pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) {
-    if !path.faces(hit, direction) {
+    if !path.faces(body, hit, direction) {
         return;
     }
     let (spectrum, draws) = (path.spectrum, path.draws.clone());

@@ -7,21 +7,20 @@ mod cells;
 mod connect;
 mod draws;
 mod facets;
-mod nested;
 mod pencil;
 mod photons;
 mod spectrum;
 mod through;
 
 use super::shade::DirectLight;
-use super::{CameraRay, Integrator, Part, Tally, View, WalkTally};
+use super::{CameraRay, Cause, Integrator, Part, Tally, View, WalkTally};
 use crate::error::{Error, Result};
 use crate::geometry::Clearance;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::query::{Hit, RayTally};
 use crate::sampling::PixelStream;
-use crate::scene::{Orders, Scene, Surface};
+use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface};
 use body::Body;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
@@ -55,6 +54,8 @@ pub struct VolumePath {
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps on the body itself, once photons have that.
     persistence: f32,
+    /// The body that the camera stands in.
+    camera_in: Option<u32>,
     /// Whether this is [`Self::once`].
     once: bool,
 }
@@ -68,14 +69,11 @@ impl VolumePath {
     /// Tables for the translucent objects of `scene`, and for no others.
     ///
     /// # Errors
-    /// One translucent object inside another.
+    /// What [`super::traceable`] finds: media in one another, surfaces that touch, meshes without an inside.
     pub fn new(scene: &Scene, options: VolumePathOptions) -> Result<Self> {
-        if let Some([a, b]) = nested::nested(scene) {
-            return Err(Error::scene(format!(
-                "{}: the translucent objects {a:?} and {b:?} overlap: `volume_path` knows one medium at a place; \
-                 move them apart, or cut one out of the other",
-                scene.name
-            )));
+        let refusals: Vec<String> = scene.obstacles().iter().filter_map(Obstacle::refusal).collect();
+        if !refusals.is_empty() {
+            return Err(Error::scene(refusals.join("\n")));
         }
         let lights = Lights::new(scene);
         let bodies: Vec<Option<Body>> =
@@ -95,7 +93,8 @@ impl VolumePath {
             (false, true) => 0.5,
             (false, false) => 0.25,
         };
-        Ok(Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence, once: false })
+        let light = DirectLight { lights, samples: 1 };
+        Ok(Self { options, light, bodies, sources, persistence, camera_in: scene.camera_in(), once: false })
     }
 
     fn shade(
@@ -113,6 +112,23 @@ impl VolumePath {
             (Some(body), _) => both_parts(&mut path, body, hit, direction),
             (None, Surface::Emissive { .. }) => path.radiance = self.of_order_0(emitted(view.scene, hit, direction)),
             _ => path.resume(hit, direction),
+        }
+        path.radiance
+    }
+
+    /// What a camera in a medium sees: radiance over η², so that a white furnace is white in there too.
+    fn shade_inside<'a>(
+        &'a self,
+        view: View<'a>,
+        pass: &'a [Option<Cells>],
+        ray: &CameraRay,
+        scratch: &'a mut Scratch,
+        tally: &'a mut Tally,
+        body: &'a Body,
+    ) -> Rgb {
+        let mut path = self.path(view, pass, ray.stream, scratch, tally);
+        if let Some(out) = path.through(body, ray.ray.origin, ray.ray.direction) {
+            path.trace(out);
         }
         path.radiance
     }
@@ -156,7 +172,8 @@ impl VolumePath {
         let body = |i| if wanted(i) { body(scene, &lights, i, 1).map(endless) } else { None };
         let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
         let sources = bodies.iter().map(|_| None).collect();
-        Self { options, light: DirectLight { lights, samples: 1 }, bodies, sources, persistence: 1.0, once: true }
+        let light = DirectLight { lights, samples: 1 };
+        Self { options, light, bodies, sources, persistence: 1.0, camera_in: None, once: true }
     }
 
     /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
@@ -190,7 +207,15 @@ fn body(scene: &Scene, lights: &Lights, index: usize, cells: u32) -> Option<Body
     let clearance = Clearance::new(meshes, lo, hi, cells);
     let scatters = t.medium.sigma_s.max() > 0.0;
     let through = || Through::new(scene, lights, index as u32, t.medium.eta, t.medium.g as f32);
-    Some(Body::new(index as u32, &t.medium, clearance, scatters.then(through).flatten()))
+    let body = Body::new(index as u32, &t.medium, clearance, scatters.then(through).flatten());
+    let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
+    let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {
+        ObstacleKind::Sheet | ObstacleKind::Holes => Some(Cause::Hole),
+        ObstacleKind::Faces | ObstacleKind::Walls | ObstacleKind::Turned => Some(Cause::WrongSide),
+        ObstacleKind::Blemish => Some(Cause::Blemish),
+        _ => None,
+    });
+    Some(Body { leak: leak.unwrap_or(Cause::Rounding), ..body })
 }
 
 impl Integrator for VolumePath {
@@ -210,8 +235,14 @@ impl Integrator for VolumePath {
     }
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        let hits = view.camera_hits(rays, tally);
         let mut scratch = Scratch::default();
+        if let Some(body) = self.camera_in.and_then(|o| self.bodies[o as usize].as_ref()) {
+            for (ray, out) in rays.iter().zip(out) {
+                *out = self.shade_inside(view, pass, ray, &mut scratch, tally, body);
+            }
+            return;
+        }
+        let hits = view.camera_hits(rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
                 None => self.of_order_0(self.light.lights.environment(ray.ray.direction)),

@@ -1,0 +1,187 @@
+//! Paths that came where no light can be: how many, at which object, and why.
+
+use crate::scene::{ObstacleKind, Scene};
+use serde::{Deserialize, Serialize};
+
+/// Why a path was lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// It went through a hole of the object's mesh.
+    Hole,
+    /// It met the back of a face of a mesh whose faces disagree about the outside.
+    WrongSide,
+    /// The object's surface passes through itself, or parts of it lie in others.
+    Blemish,
+    /// Inside the object it met another medium.
+    OtherMedium,
+    /// The mesh is sound: a rounded coordinate came to lie on the other side of a face.
+    Rounding,
+}
+
+/// Paths lost at one object for one cause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Loss {
+    /// Index of the object; of several objects beyond those that are counted apart, `u32::MAX`.
+    pub object: u32,
+    /// Why.
+    pub cause: Cause,
+    /// How many.
+    pub paths: u64,
+}
+
+/// Counted apart.
+const APART: usize = 8;
+
+/// Counts of lost paths by object and cause; those of the first eight pairs, the rest together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "Vec<Loss>", into = "Vec<Loss>")]
+pub struct Losses {
+    counts: [Option<Loss>; APART],
+    others: u64,
+}
+
+/// More than this share of the paths lost is a warning, and an error for `--strict`.
+pub const TOLERATED: f64 = 1e-3;
+
+impl Losses {
+    /// One more.
+    pub fn add(&mut self, object: u32, cause: Cause) {
+        self.count(Loss { object, cause, paths: 1 });
+    }
+
+    fn count(&mut self, loss: Loss) {
+        for place in &mut self.counts {
+            match place {
+                Some(known) if (known.object, known.cause) == (loss.object, loss.cause) => {
+                    known.paths += loss.paths;
+                    return;
+                }
+                None => {
+                    *place = Some(loss);
+                    return;
+                }
+                Some(_) => {}
+            }
+        }
+        self.others += loss.paths;
+    }
+
+    /// Each object and cause apart.
+    pub fn each(&self) -> impl Iterator<Item = &Loss> {
+        self.counts.iter().flatten()
+    }
+
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.each().map(|l| l.paths).sum::<u64>() + self.others
+    }
+
+    /// Whether that is more than [`TOLERATED`] of `paths`.
+    pub fn are_many(&self, paths: u64) -> bool {
+        self.total() as f64 > TOLERATED * paths as f64
+    }
+
+    /// A sentence for each object and cause, of `paths` paths: number, name, cause and remedy.
+    pub fn sentences(&self, scene: &Scene, paths: u64) -> Vec<String> {
+        let share = |n: u64| 100.0 * n as f64 / paths.max(1) as f64;
+        let mut said: Vec<String> = self
+            .each()
+            .map(|loss| {
+                let name = scene.objects.get(loss.object as usize).map_or("?", |o| o.name.as_str());
+                let (n, why) = (loss.paths, why(scene, name, loss.cause));
+                format!(
+                    "{n} of {paths} paths ({:.2} %) were lost at object {name:?}: {why}; they carry nothing",
+                    share(n)
+                )
+            })
+            .collect();
+        if self.others > 0 {
+            let n = self.others;
+            said.push(format!(
+                "{n} of {paths} paths ({:.2} %) were lost at other objects; they carry nothing",
+                share(n)
+            ));
+        }
+        said
+    }
+}
+
+/// Cause and remedy.
+fn why(scene: &Scene, name: &str, cause: Cause) -> String {
+    match cause {
+        Cause::Hole => {
+            let edges = scene.objects.iter().find(|o| o.name == name).map_or(0, |o| o.findings.open_edges);
+            format!("they came through holes of its mesh ({edges} edges belong to one triangle alone): close them")
+        }
+        Cause::WrongSide => "they met backs of faces that disagree about the outside: --repair turns faces".into(),
+        Cause::Blemish => "its surface passes through itself: a union of the mesh with itself mends that".into(),
+        Cause::OtherMedium => {
+            let overlaps = |kind: ObstacleKind| {
+                matches!(kind, ObstacleKind::Crossing | ObstacleKind::Nested | ObstacleKind::Touching)
+            };
+            let with = scene.obstacles().iter().filter(|o| overlaps(o.kind) && o.objects.len() == 2);
+            let others: Vec<String> = with
+                .filter(|o| o.objects.iter().any(|other| other == name))
+                .flat_map(|o| o.objects.iter().filter(|other| *other != name))
+                .map(|other| format!("{other:?}"))
+                .collect();
+            if others.is_empty() {
+                "they met another medium inside it, put there by rounding: leave a larger gap between the two".into()
+            } else {
+                format!("they met {} inside it: move them apart, or make one mesh of both", others.join(", "))
+            }
+        }
+        Cause::Rounding => {
+            "rounding put them on the other side of its surface: make what is thinnest thicker, or bring \
+                            what is far away nearer"
+                .into()
+        }
+    }
+}
+
+impl std::ops::AddAssign for Losses {
+    fn add_assign(&mut self, other: Self) {
+        other.each().for_each(|loss| self.count(*loss));
+        self.others += other.others;
+    }
+}
+
+impl From<Vec<Loss>> for Losses {
+    fn from(list: Vec<Loss>) -> Self {
+        let mut losses = Self::default();
+        for loss in list {
+            if loss.object == u32::MAX { losses.others += loss.paths } else { losses.count(loss) }
+        }
+        losses
+    }
+}
+
+impl From<Losses> for Vec<Loss> {
+    fn from(losses: Losses) -> Self {
+        let others = Loss { object: u32::MAX, cause: Cause::Rounding, paths: losses.others };
+        losses.each().copied().chain((losses.others > 0).then_some(others)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_forgotten_in_sums_and_files() {
+        let mut losses = Losses::default();
+        for object in 0..20 {
+            for _ in 0..=object {
+                losses.add(object, if object % 2 == 0 { Cause::Hole } else { Cause::Rounding });
+            }
+        }
+        assert_eq!((losses.total(), losses.each().count()), (210, APART));
+        let text = serde_json::to_string(&losses).unwrap();
+        assert_eq!(serde_json::from_str::<Losses>(&text).unwrap(), losses);
+        let mut twice = losses;
+        twice += losses;
+        assert_eq!(twice.total(), 420);
+        assert!(losses.are_many(209_999) && !losses.are_many(210_000));
+    }
+}

@@ -1,0 +1,482 @@
+//! What stands in the way of knowing which medium is where: bodies in one another, surfaces that touch, meshes without an inside, lamps
+//! and cameras in media. Read first: [`Obstacle`]; docs/robustness.md has the table.
+
+use super::options::MethodName;
+use super::{Object, Scene, Surface};
+use crate::geometry::{Contact, Part, Seek, Solid, meeting};
+use crate::math::DVec3;
+use std::sync::OnceLock;
+
+/// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
+const OFFSETS: f64 = 2.0;
+/// The least share of the largest coordinate, whatever rays are traced in: contacts are found in f64.
+const LEAST_GAP: f64 = 1e-12;
+/// Less than this share of a surface at fault is traced with a warning; so are parts smaller than this share. About as many paths are
+/// lost there.
+const MINOR: f64 = 1e-3;
+/// Less than this is not said beforehand: what is lost there is counted.
+const LEAST: f64 = 1e-4;
+/// A mesh of which more than this share is holes has no inside.
+const MOSTLY_HOLES: f64 = 0.05;
+
+/// Kinds of obstacles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ObstacleKind {
+    /// Two media at one place: surfaces pass through each other.
+    Crossing,
+    /// Two media at one place: one inside the other.
+    Nested,
+    /// Surfaces that lie in each other over an area.
+    Touching,
+    /// A surface without an inside.
+    Sheet,
+    /// A mesh with holes.
+    Holes,
+    /// Little of a surface passes through itself or lies inside.
+    Blemish,
+    /// Faces that disagree about where inside is, or repeat others.
+    Faces,
+    /// Parts whose faces look inwards.
+    Turned,
+    /// Faces inside a body, between parts that share their edges.
+    Walls,
+    /// A lamp inside a body, wholly or partly.
+    LampInside,
+    /// A lamp in a face of a body.
+    LampTouching,
+    /// An opaque surface in a face of a body.
+    OpaqueTouching,
+    /// The camera inside a body.
+    CameraInside,
+    /// The camera in the surface of a body.
+    CameraTouching,
+    /// Too many faces in one place to look at.
+    Unknown,
+}
+
+/// Something that a method may not be able to render, with its names, numbers and the remedy.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Obstacle {
+    /// Which kind.
+    pub kind: ObstacleKind,
+    /// Names of the objects, bodies first.
+    pub objects: Vec<String>,
+    /// Where it stands in the scene file.
+    pub at: String,
+    /// What was found.
+    pub what: String,
+    /// What can be done.
+    pub remedy: String,
+    /// Whether a remark on the mesh says it already.
+    said: bool,
+}
+
+impl Obstacle {
+    /// Whether `volume_path` refuses the scene for it, and why.
+    pub fn refusal(&self) -> Option<String> {
+        use ObstacleKind::*;
+        let why = match self.kind {
+            Crossing | Nested => "`volume_path` knows one medium at a place",
+            Touching => "`volume_path` cannot tell which medium comes first",
+            Sheet | Faces | Walls | Turned => "`volume_path` needs an inside",
+            LampTouching | CameraTouching => "`volume_path` cannot tell whether that is inside",
+            Holes | Blemish | LampInside | OpaqueTouching | CameraInside | Unknown => return None,
+        };
+        Some(self.sentence(why))
+    }
+
+    /// What `method` gets wrong for it, if it renders all the same and no other warning says so.
+    pub fn warning(&self, method: MethodName) -> Option<String> {
+        use ObstacleKind::*;
+        let effect = match (method, self.kind) {
+            (MethodName::AmbientOcclusion | MethodName::Direct, _) => return None,
+            (_, OpaqueTouching) => "light may pass there from one side to the other",
+            (_, Unknown) => "what is inside is not known there",
+            (MethodName::VolumePath, Holes | Blemish) => "paths that come there are lost, and counted",
+            (MethodName::VolumePath, _) | (_, Holes | Blemish) => return None,
+            _ if self.said => return None,
+            (_, Crossing | Nested) => {
+                "`subsurface` lights each surface by itself: what lies inside takes no light, and light does not pass from one to the \
+                 other"
+            }
+            (_, Touching) => {
+                "`subsurface` lets no light pass between them, and the faces that touch stay dark or not by chance"
+            }
+            (_, Sheet) => {
+                "`subsurface` takes it for the skin of a thick body: what enters on one side does not leave on the other"
+            }
+            (_, Faces | Walls | Turned) => "`subsurface` lights each face as if the outside were before it",
+            (_, LampInside) => {
+                "`subsurface` takes light from outside alone, as if that lamp were off; take --method volume_path"
+            }
+            (_, LampTouching) => "whether its light enters there is left to rounding",
+            (_, CameraInside) => "`subsurface` shows bodies from outside alone: black; take --method volume_path",
+            (_, CameraTouching) => "whether it is inside is left to rounding",
+        };
+        Some(self.sentence(effect))
+    }
+
+    fn sentence(&self, why: &str) -> String {
+        let remedy = if self.remedy.is_empty() { String::new() } else { format!("; {}", self.remedy) };
+        format!("{}: {}: {why}{remedy}", self.at, self.what)
+    }
+}
+
+/// What is inside what in a scene, once somebody has asked; see [`Scene::obstacles`].
+#[derive(Debug, Default)]
+pub struct Insides(OnceLock<Found>);
+
+#[derive(Debug, Default)]
+struct Found {
+    obstacles: Vec<Obstacle>,
+    camera_in: Option<u32>,
+}
+
+impl Scene {
+    /// What stands in the way of knowing which medium is where, for every translucent object; looked for when it is first asked.
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.insides.0.get_or_init(|| Found::new(self)).obstacles
+    }
+
+    /// The translucent object that the camera stands in.
+    pub fn camera_in(&self) -> Option<u32> {
+        self.insides.0.get_or_init(|| Found::new(self)).camera_in
+    }
+}
+
+/// An object with its solid.
+struct Body<'a> {
+    index: u32,
+    object: &'a Object,
+    kind: Role,
+    solid: Solid,
+    bounds: (DVec3, DVec3),
+    /// The gap that its surface needs, as a share of the largest coordinate.
+    share: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Role {
+    Medium,
+    Lamp,
+    Opaque,
+}
+
+impl Found {
+    /// Looks at every translucent object, alone and with all that comes near it; at nothing else.
+    pub(super) fn new(scene: &Scene) -> Self {
+        let role = |o: &Object| match &scene.materials[o.material].surface {
+            Surface::Translucent(_) => Role::Medium,
+            Surface::Emissive { radiance, .. } if !radiance.is_black() => Role::Lamp,
+            _ => Role::Opaque,
+        };
+        let all: Vec<_> =
+            (0_u32..).zip(&scene.objects).filter_map(|(i, o)| Some((i, o, role(o), o.mesh.bounds()?))).collect();
+        let share = scene.objects.iter().map(|o| OFFSETS * o.mesh.precision.error(1.0)).fold(LEAST_GAP, f64::max);
+        let near = |a: &(DVec3, DVec3), b: &(DVec3, DVec3)| {
+            let gap = DVec3::splat(gap(share, a, b));
+            a.0.cmple(b.1 + gap).all() && b.0.cmple(a.1 + gap).all()
+        };
+        // Pairs whose boxes come near each other, one of them of a medium; along the axis sorted by.
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        order.sort_by(|&a, &b| all[a].3.0.x.total_cmp(&all[b].3.0.x));
+        let (mut pairs, mut wanted) = (Vec::new(), vec![false; all.len()]);
+        for (place, &i) in order.iter().enumerate() {
+            wanted[i] |= all[i].2 == Role::Medium;
+            for &j in &order[place + 1..] {
+                if all[j].3.0.x > all[i].3.1.x + gap(share, &all[i].3, &all[j].3) {
+                    break;
+                }
+                let medium = [i, j].iter().any(|&k| all[k].2 == Role::Medium);
+                if medium && near(&all[i].3, &all[j].3) {
+                    (wanted[i], wanted[j]) = (true, true);
+                    let first =
+                        if all[i].2 == Role::Medium && (all[j].2 != Role::Medium || i < j) { (i, j) } else { (j, i) };
+                    pairs.push(first);
+                }
+            }
+        }
+        pairs.sort_unstable();
+        let bodies: Vec<Option<Body<'_>>> = all
+            .into_iter()
+            .zip(wanted)
+            .map(|((index, object, kind, bounds), wanted)| {
+                wanted.then(|| Body { index, object, kind, solid: Solid::new(&object.mesh), bounds, share })
+            })
+            .collect();
+        let mut found = Self::default();
+        for body in bodies.iter().flatten().filter(|b| b.kind == Role::Medium) {
+            let solid = alone(scene, body, &mut found.obstacles);
+            found.look_from(scene, body, solid);
+        }
+        for (i, j) in pairs {
+            if let (Some(a), Some(b)) = (&bodies[i], &bodies[j]) {
+                found.obstacles.extend(pair(scene, a, b));
+            }
+        }
+        found
+    }
+
+    /// Whether the camera is in a body.
+    fn look_from(&mut self, scene: &Scene, body: &Body<'_>, solid: bool) {
+        let camera = scene.camera.origin;
+        let gap = gap(body.share, &body.bounds, &(camera, camera));
+        let obstacle = |kind, what: String, remedy: String| Obstacle {
+            kind,
+            objects: vec![body.object.name.clone()],
+            at: body.object.at.clone(),
+            what,
+            remedy,
+            said: false,
+        };
+        let name = &body.object.name;
+        if body.solid.is_near(camera, gap) {
+            let what = format!("the camera stands in the surface of object {name:?}");
+            self.obstacles.push(obstacle(
+                ObstacleKind::CameraTouching,
+                what,
+                format!("move it by more than {gap:.1e} units"),
+            ));
+        } else if solid && body.solid.winding(camera, |_| true).is_some_and(|w| w != 0) {
+            self.camera_in = Some(body.index);
+            let what = format!("the camera stands inside object {name:?}");
+            self.obstacles.push(obstacle(ObstacleKind::CameraInside, what, String::new()));
+        }
+    }
+}
+
+/// Distance [unit] below which surfaces within the two boxes are as good as in one place.
+fn gap(share: f64, a: &(DVec3, DVec3), b: &(DVec3, DVec3)) -> f64 {
+    share * [a.0, a.1, b.0, b.1].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
+}
+
+/// A place in the file's coordinates.
+fn near(scene: &Scene, contact: &Contact) -> String {
+    let p = contact.at + scene.centre;
+    format!("near [{:.4}, {:.4}, {:.4}]", p.x, p.y, p.z)
+}
+
+/// What is wrong with one medium's mesh by itself; whether it has an inside.
+fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
+    let (solid, name) = (&body.solid, &body.object.name);
+    let gap = gap(body.share, &body.bounds, &body.bounds);
+    let mut say = |kind, what: String, remedy: &str| {
+        out.push(Obstacle {
+            kind,
+            objects: vec![name.clone()],
+            at: body.object.at.clone(),
+            // A remark on the mesh says the same.
+            said: match kind {
+                ObstacleKind::Faces => true,
+                ObstacleKind::Turned => body.object.findings.inside_out(),
+                _ => false,
+            },
+            what: format!("object {name:?}: {what}"),
+            remedy: remedy.into(),
+        });
+    };
+    let area: f64 = solid.parts.iter().map(|p| p.area).sum();
+    if area == 0.0 {
+        return false;
+    }
+    seams(solid, gap, &mut say);
+    if !solid.is_convex(gap) {
+        meets_itself(scene, solid, gap, &mut say);
+    }
+    solid.seams.hole_share <= MOSTLY_HOLES
+}
+
+/// Edges that leave open what is inside.
+fn seams(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+    let seams = &solid.seams;
+    if seams.repeated > 0 {
+        say(ObstacleKind::Faces, format!("{} triangles repeat another", seams.repeated), "--repair removes them");
+    }
+    if seams.mixed > 0 {
+        let what = format!("faces disagree about the outside along {} edges", seams.mixed);
+        say(ObstacleKind::Faces, what, "--repair turns them");
+    }
+    if seams.walls > 0 {
+        let what = format!(
+            "{} edges belong to three triangles or more, as walls inside a body or fins on it have them",
+            seams.walls
+        );
+        say(ObstacleKind::Walls, what, "remove the faces between the parts");
+    }
+    let (share, edges) = (100.0 * seams.hole_share, seams.open);
+    if seams.hole_share > MOSTLY_HOLES {
+        let what = format!(
+            "an open sheet has no inside ({edges} edges belong to one triangle alone; the openings are {share:.0} % of its surface)"
+        );
+        say(ObstacleKind::Sheet, what, "give it a thickness, as a closed mesh, or close the openings of a solid body");
+    } else if edges > 0 {
+        say(ObstacleKind::Holes, format!("{edges} edges are rims of holes, {share:.2} % of its surface"), "close them");
+    }
+    if solid.parts.iter().any(|p| p.closed && p.volume.abs() <= gap * p.area && p.area > 0.0) {
+        let what = format!("a closed part encloses nothing (thinner than {:.1e} units)", 2.0 * gap);
+        say(ObstacleKind::Sheet, what, "give it a thickness");
+    }
+}
+
+/// Parts in one another, and a part that passes through itself.
+fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+    let parts = &solid.parts;
+    let area: f64 = parts.iter().map(|p| p.area).sum();
+    let large = |i: u32| parts[i as usize].area > MINOR * area;
+    let found = meeting(solid, solid, gap, Seek::Crossing, |[a, b]| a != b && large(a) && large(b));
+    let all = parts.len();
+    let union = "make one surface of them (a union), or cut one out of the other";
+    if let Some(c) = &found.crossing {
+        let what = format!("two of its {all} parts overlap: they pass through each other {}", near(scene, c));
+        return say(ObstacleKind::Crossing, what, union);
+    }
+    if let Some(c) = &found.touching {
+        let what = format!("two of its {all} parts touch: faces lie in each other {}", near(scene, c));
+        let remedy = format!("join them without the faces between, or leave a gap of at least {gap:.1e} units");
+        say(ObstacleKind::Touching, what, &remedy);
+    }
+    if found.unfinished {
+        let what = format!("too many faces of its {all} parts are in one place to look at all");
+        say(ObstacleKind::Unknown, what, "");
+    }
+    parts_in_parts(solid, gap, say);
+    if let Some(c) = &found.minor {
+        let share = solid.hidden_share().max(found.minor_area / area);
+        if share < LEAST {
+            return;
+        }
+        let (kind, remedy) = if share > MINOR {
+            (ObstacleKind::Crossing, "make one surface of it (a union with itself), or pull it apart")
+        } else {
+            (ObstacleKind::Blemish, "a union with itself mends that")
+        };
+        let what = format!(
+            "its surface meets itself {}, and maybe elsewhere; {:.2} % of it lies inside it",
+            near(scene, c),
+            100.0 * share
+        );
+        say(kind, what, remedy);
+    }
+}
+
+/// Parts inside others: right as cavities, and as bodies in cavities.
+fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+    let parts = &solid.parts;
+    let area: f64 = parts.iter().map(|p| p.area).sum();
+    let [mut nested, mut open, mut turned] = [(0, 0.0); 3];
+    for (i, part) in parts.iter().enumerate() {
+        let around = |(j, other): (usize, &Part)| {
+            let inside = other.bounds.0.cmple(part.bounds.0).all() && other.bounds.1.cmpge(part.bounds.1).all();
+            j != i && other.closed && inside
+        };
+        if part.area == 0.0 || part.closed && part.volume.abs() <= gap * part.area {
+            continue;
+        }
+        let others = |j: u32| j as usize != i && parts[j as usize].closed;
+        let is_within = parts.iter().enumerate().any(around);
+        let outside = if is_within { solid.winding(solid.point_of(i), others).unwrap_or(0) } else { 0 };
+        let sum = match (part.closed, part.volume > 0.0, outside) {
+            (true, true, 0) | (true, false, 1) | (false, _, 0) => continue,
+            (false, ..) => &mut open,
+            (true, true, _) => &mut nested,
+            (true, false, _) => &mut turned,
+        };
+        *sum = (sum.0 + 1, sum.1 + part.area);
+    }
+    let all = parts.len();
+    let cavity = "remove them, or make them cavities: closed, their faces turned inwards";
+    let inside =
+        [(nested, "lie inside another part, and look outwards"), (open, "are open and lie inside a closed one")];
+    for ((count, part), what) in inside {
+        let kind = if part > MINOR * area { ObstacleKind::Nested } else { ObstacleKind::Blemish };
+        if count > 0 {
+            say(kind, format!("{count} of its {all} parts {what}"), cavity);
+        }
+    }
+    if turned.0 > 0 {
+        let kind = if turned.1 > MINOR * area { ObstacleKind::Turned } else { ObstacleKind::Blemish };
+        let what = format!("{} of its {all} parts look inwards with nothing around them", turned.0);
+        say(kind, what, "set flip = true, or --repair turns them");
+    }
+}
+
+/// What is wrong with a medium `a` and another object.
+fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> Option<Obstacle> {
+    let gap = gap(a.share, &a.bounds, &b.bounds);
+    let (one, other) = (&a.object.name, &b.object.name);
+    let obstacle = |kind, what: String, remedy: String| {
+        let (objects, at) = (vec![one.clone(), other.clone()], b.object.at.clone());
+        Some(Obstacle { kind, objects, at, what, remedy, said: false })
+    };
+    let seek = if b.kind == Role::Opaque { Seek::Touching } else { Seek::Crossing };
+    let found = meeting(&a.solid, &b.solid, gap, seek, |_| true);
+    let apart = format!("leave a gap of at least {gap:.1e} units");
+    match b.kind {
+        Role::Opaque => {
+            let c = found.touching?;
+            let what =
+                format!("a face of object {other:?} lies in one of the translucent object {one:?} {}", near(scene, &c));
+            obstacle(ObstacleKind::OpaqueTouching, what, apart)
+        }
+        Role::Lamp => {
+            if let Some(c) = found.touching {
+                let what = format!(
+                    "a face of lamp {other:?} lies in one of the translucent object {one:?} {}",
+                    near(scene, &c)
+                );
+                return obstacle(ObstacleKind::LampTouching, what, apart);
+            }
+            let how = if found.crossing.is_some() {
+                "partly inside"
+            } else if holds(&a.solid, &b.solid) {
+                "inside"
+            } else {
+                return None;
+            };
+            let what = format!("lamp {other:?} lies {how} object {one:?}");
+            obstacle(ObstacleKind::LampInside, what, String::new())
+        }
+        Role::Medium => {
+            let union = "move them apart, cut one out of the other and leave a gap, or make one mesh of both (a union)";
+            if let Some(c) = found.crossing {
+                let what = format!(
+                    "the translucent objects {one:?} and {other:?} overlap: they pass through each other {}",
+                    near(scene, &c)
+                );
+                return obstacle(ObstacleKind::Crossing, what, union.into());
+            }
+            if let Some(c) = found.touching {
+                let what = format!(
+                    "the translucent objects {one:?} and {other:?} touch: faces lie in each other {}",
+                    near(scene, &c)
+                );
+                let remedy = format!("{apart}, or join them into one mesh without the faces between");
+                return obstacle(ObstacleKind::Touching, what, remedy);
+            }
+            let (outer, inner) = match (holds(&a.solid, &b.solid), holds(&b.solid, &a.solid)) {
+                (true, _) => (one, other),
+                (_, true) => (other, one),
+                _ if found.unfinished => {
+                    let what = format!(
+                        "the translucent objects {one:?} and {other:?} have too many faces in one place to look at all"
+                    );
+                    return obstacle(ObstacleKind::Unknown, what, String::new());
+                }
+                _ => return None,
+            };
+            let what =
+                format!("the translucent objects {one:?} and {other:?} overlap: {inner:?} lies inside {outer:?}");
+            obstacle(ObstacleKind::Nested, what, union.into())
+        }
+    }
+}
+
+/// Whether a part of `inner` is inside `outer`, where their surfaces do not cross.
+fn holds(outer: &Solid, inner: &Solid) -> bool {
+    let Some((lo, hi)) = outer.bounds() else { return false };
+    inner.parts.iter().enumerate().any(|(i, part)| {
+        let within = part.bounds.0.cmple(hi).all() && part.bounds.1.cmpge(lo).all();
+        within && outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0)
+    })
+}

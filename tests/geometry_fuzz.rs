@@ -1,0 +1,313 @@
+//! Random scenes of two to four translucent bodies: what `volume_path` accepts it traces without loss, and what is on paper
+//! two media at one place it refuses. `MARMOR_GEOMETRY_SCENES=10000` asks for more scenes than the suite has.
+#![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
+#![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
+
+use marmor::film::{Film, Window};
+use marmor::geometry::{ObjMesh, write_obj};
+use marmor::integrator::{TOLERATED, View, VolumePath, VolumePathOptions, traceable};
+use marmor::math::{DVec3, hash, unit_f64};
+use marmor::query::{self, Backend};
+use marmor::render::{self, Job};
+use marmor::scene::{ObstacleKind, Orders, Scene, SceneFile};
+use std::sync::atomic::AtomicBool;
+
+/// Numbers of one scene.
+struct Dice(u64);
+
+impl Dice {
+    fn number(&mut self) -> f64 {
+        self.0 += 1;
+        unit_f64((hash(self.0) >> 32) as u32)
+    }
+
+    fn between(&mut self, lo: f64, hi: f64) -> f64 {
+        lo + (hi - lo) * self.number()
+    }
+
+    fn below(&mut self, n: u32) -> u32 {
+        ((self.number() * f64::from(n)) as u32).min(n - 1)
+    }
+
+    fn direction(&mut self) -> DVec3 {
+        let (z, phi) = (self.between(-1.0, 1.0), self.between(0.0, std::f64::consts::TAU));
+        let r = (1.0 - z * z).sqrt();
+        DVec3::new(r * phi.cos(), r * phi.sin(), z)
+    }
+}
+
+/// A box, each face cut into `n` by `n` squares, the diagonals one way or the other.
+fn cuboid(half: DVec3, n: u32, other: bool) -> ObjMesh {
+    let mut mesh = ObjMesh::default();
+    for axis in 0..3 {
+        let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
+        for (w, u) in [(DVec3::AXES[axis], u), (-DVec3::AXES[axis], -u)] {
+            for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
+                let base = mesh.positions.len() as u32;
+                for (a, b) in [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)] {
+                    let at = |k: u32| (2.0 * f64::from(k) - f64::from(n)) / f64::from(n);
+                    mesh.positions.push(half * (w + u * at(a) + v * at(b)));
+                }
+                let quads = if other { [[0, 1, 3], [1, 2, 3]] } else { [[0, 1, 2], [0, 2, 3]] };
+                mesh.triangles.extend(quads.map(|t| t.map(|k| base + k)));
+            }
+        }
+    }
+    mesh
+}
+
+fn torus(large: f64, small: f64, n: u32) -> ObjMesh {
+    let mut mesh = ObjMesh::default();
+    for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
+        let [u, v] = [i, j].map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(n));
+        let r = large + small * v.cos();
+        mesh.positions.push(DVec3::new(r * u.cos(), r * u.sin(), small * v.sin()));
+        let at = |i: u32, j: u32| i % n * n + j % n;
+        mesh.triangles.extend([[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]);
+    }
+    mesh
+}
+
+/// A body in its own place, the radius of a ball around it, and half its edges if it is a box.
+#[derive(Clone)]
+struct Body {
+    mesh: ObjMesh,
+    centre: DVec3,
+    radius: f64,
+    half: Option<DVec3>,
+}
+
+fn body(dice: &mut Dice, boxes: bool) -> Body {
+    let size = dice.between(0.5, 1.5);
+    let (mesh, radius, half) = match if boxes { 0 } else { dice.below(3) } {
+        0 => {
+            let half = DVec3::new(dice.between(0.3, 1.0), dice.between(0.3, 1.0), dice.between(0.3, 1.0)) * size;
+            (cuboid(half, 1 + dice.below(3), dice.below(2) == 0), half.length(), Some(half))
+        }
+        1 => {
+            let mut ball = marmor::geometry::sphere(DVec3::ZERO, size, 6 + dice.below(6), 9 + dice.below(9));
+            ball.normals = None;
+            (ball, size, None)
+        }
+        _ => (torus(0.7 * size, 0.25 * size, 8 + dice.below(6)), 0.95 * size, None),
+    };
+    Body { mesh, centre: DVec3::ZERO, radius, half }
+}
+
+/// What a new body is to the one before.
+#[derive(Clone, Copy, PartialEq, Debug)]
+enum Placed {
+    Apart,
+    /// A little above the gap that counts as none.
+    Nearly,
+    /// A part of a face in common.
+    Face,
+    /// Nothing but a part of an edge, or a corner.
+    Edge,
+    Equal,
+    Overlap,
+    Nested,
+    /// Nested, and turned inwards, in one mesh.
+    Cavity,
+    /// A bar through it.
+    Through,
+}
+
+const ALL: [Placed; 9] = [
+    Placed::Apart,
+    Placed::Nearly,
+    Placed::Face,
+    Placed::Edge,
+    Placed::Equal,
+    Placed::Overlap,
+    Placed::Nested,
+    Placed::Cavity,
+    Placed::Through,
+];
+
+impl Placed {
+    /// Whether `volume_path` has to refuse it, whatever else is there.
+    fn is_bad(self) -> bool {
+        matches!(self, Self::Face | Self::Equal | Self::Overlap | Self::Nested | Self::Through)
+    }
+}
+
+/// A body placed so with regard to `last`, a box where that is asked for.
+fn place(dice: &mut Dice, last: &Body, how: Placed) -> Body {
+    let mut new = body(dice, matches!(how, Placed::Face | Placed::Nearly | Placed::Edge));
+    let half = last.half.unwrap_or(DVec3::splat(0.5 * last.radius));
+    let axis = dice.below(3) as usize;
+    let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+    let side = if dice.below(2) == 0 { 1.0 } else { -1.0 };
+    let (reach, wide) =
+        (new.half.unwrap_or_default(), |k: usize, new: &Body| half[k] + new.half.unwrap_or_default()[k]);
+    match how {
+        Placed::Apart => new.centre = dice.direction() * (last.radius + new.radius) * dice.between(1.001, 1.5),
+        Placed::Face | Placed::Nearly => {
+            let gap = if how == Placed::Face { 0.0 } else { 1e-4 * 10.0_f64.powf(dice.between(0.0, 2.0)) };
+            new.centre[axis] = side * (half[axis] + reach[axis] + gap);
+            for k in [u, v] {
+                // Equal extents and one corner in common more often than by luck.
+                new.centre[k] = match dice.below(3) {
+                    0 => 0.0,
+                    1 => half[k] - reach[k],
+                    _ => 0.7 * wide(k, &new) * dice.between(-1.0, 1.0),
+                };
+            }
+        }
+        Placed::Edge => {
+            new.centre[axis] = side * wide(axis, &new);
+            new.centre[u] = wide(u, &new);
+            new.centre[v] = [0.0, wide(v, &new), 0.5 * wide(v, &new)][dice.below(3) as usize];
+        }
+        Placed::Equal => new = Body { centre: DVec3::ZERO, ..last.clone() },
+        Placed::Overlap => {
+            new = Body { centre: DVec3::ZERO, ..last.clone() };
+            new.centre = dice.direction() * 0.2 * last.radius;
+        }
+        Placed::Nested | Placed::Cavity => {
+            // About the middle of the tube, if it is a torus.
+            let tube = last.half.is_none()
+                && last.mesh.positions.iter().all(|p| p.length() > 0.3 * last.radius && p.z.abs() < 0.6 * last.radius);
+            let (at, scale) = if tube {
+                (DVec3::X * 0.7 / 0.95 * last.radius, 0.1 * last.radius)
+            } else {
+                (DVec3::ZERO, 0.2 * half.min_element())
+            };
+            new.mesh.positions.iter_mut().for_each(|p| *p *= scale / new.radius);
+            new.half = new.half.map(|h| h * scale / new.radius);
+            (new.radius, new.centre) = (scale, at);
+            if how == Placed::Cavity {
+                new.mesh = new.mesh.flipped();
+            }
+        }
+        Placed::Through => {
+            let mut bar = DVec3::splat(0.2 * half.min_element());
+            bar[axis] = 2.0 * last.radius;
+            new = Body {
+                mesh: cuboid(bar, 1 + dice.below(3), false),
+                centre: DVec3::ZERO,
+                radius: bar.length(),
+                half: Some(bar),
+            };
+            if last.half.is_none() {
+                new.centre = last.mesh.positions[0] * 0.999;
+            } else if dice.below(2) == 0 {
+                // Faces in one plane.
+                new.centre[u] = half[u] - bar[u];
+            }
+        }
+    }
+    new.centre += last.centre;
+    new
+}
+
+fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
+    let base = a.positions.len() as u32;
+    a.positions.extend(&b.positions);
+    a.triangles.extend(b.triangles.iter().map(|t| t.map(|i| base + i)));
+    a
+}
+
+/// A scene and what its bodies are to each other.
+fn scene(number: u64) -> (Scene, Vec<Placed>) {
+    let mut dice = Dice(number << 20);
+    let mut bodies = vec![body(&mut dice, number % 2 == 0)];
+    let mut placed = Vec::new();
+    let count = 1 + dice.below(3);
+    let mut meshes = vec![vec![0_usize]];
+    for i in 0..count {
+        // Every kind as often as any other, and first of all where it is alone.
+        let how = if i == 0 { ALL[(number % 9) as usize] } else { ALL[dice.below(9) as usize] };
+        if matches!(how, Placed::Face | Placed::Nearly | Placed::Edge) && bodies.last().unwrap().half.is_none() {
+            *bodies.last_mut().unwrap() = Body { centre: bodies.last().unwrap().centre, ..body(&mut dice, true) };
+        }
+        let new = place(&mut dice, bodies.last().unwrap(), how);
+        bodies.push(new);
+        placed.push(how);
+        if how == Placed::Cavity || dice.below(3) == 0 {
+            meshes.last_mut().unwrap().push(bodies.len() - 1);
+        } else {
+            meshes.push(vec![bodies.len() - 1]);
+        }
+    }
+    // Turned, half of them.
+    let turn = if dice.below(2) == 0 {
+        glam::DMat3::IDENTITY
+    } else {
+        glam::DMat3::from_axis_angle(dice.direction(), dice.between(0.0, 6.0))
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let eta = [1.0, 1.3, 0.75][dice.below(3) as usize];
+    let g = dice.between(-0.5, 0.8);
+    let mut text = format!(
+        "unit = \"mm\"\n[environment]\nradiance = 1\n[material.wax]\ntype = \"translucent\"\nsigma_s = {}\nsigma_a = 0\ng = {g}\neta = {eta}\n",
+        dice.between(0.5, 4.0)
+    );
+    let (mut middle, mut far) = (DVec3::ZERO, 0.0_f64);
+    for body in &bodies {
+        middle += turn * body.centre / bodies.len() as f64;
+    }
+    for (k, parts) in meshes.iter().enumerate() {
+        let mesh = parts.iter().map(|&b| bodies[b].mesh.clone().placed(turn, turn * bodies[b].centre));
+        let mesh = mesh.reduce(|a, b| joined(a, &b)).unwrap();
+        far = mesh.positions.iter().map(|p| p.distance(middle)).fold(far, f64::max);
+        let mut obj = Vec::new();
+        write_obj(&mesh, &mut obj).unwrap();
+        std::fs::write(folder.path().join(format!("{k}.obj")), obj).unwrap();
+        text += &format!("[[object]]\nname = \"{k}\"\nmesh = \"{k}.obj\"\nmaterial = \"wax\"\n");
+    }
+    let eye = middle + dice.direction() * 4.0 * far;
+    text += &format!(
+        "[camera]\nposition = {:?}\nlook_at = {:?}\nfov = 20\nup = [0.3, 0.5, 0.8]\nresolution = [8, 8]\n[method]\nname = \"volume_path\"\n",
+        eye.to_array(),
+        middle.to_array()
+    );
+    (Scene::load(&SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap()).unwrap(), placed)
+}
+
+#[test]
+fn no_scene_is_both_accepted_and_wrong() {
+    let count = std::env::var("MARMOR_GEOMETRY_SCENES").map_or(270, |n| n.parse().unwrap());
+    let (mut accepted, mut paths, mut lost, mut worst) = (0, 0, 0, 0.0_f64);
+    let backends: Vec<Backend> = Backend::ALL.into_iter().filter(|b| b.is_built_in()).collect();
+    for number in 0..count {
+        let (scene, placed) = scene(number);
+        let refusals = traceable(&scene);
+        let what = format!("scene {number}, {placed:?}: {refusals:?}");
+        // A body in a cavity is well placed.
+        let in_cavity = |i: usize| placed[i] == Placed::Nested && i > 0 && placed[i - 1] == Placed::Cavity;
+        if (0..placed.len()).any(|i| placed[i].is_bad() && !in_cavity(i)) {
+            assert!(!refusals.is_empty(), "accepted: {what}");
+            continue;
+        }
+        if placed.len() == 1 {
+            assert!(refusals.is_empty(), "refused: {what}");
+        }
+        if !refusals.is_empty() {
+            continue;
+        }
+        assert!(!scene.obstacles().iter().any(|o| o.kind == ObstacleKind::Unknown), "{what}");
+        accepted += 1;
+        let rays = query::build(backends[number as usize % backends.len()], &scene.meshes()).unwrap();
+        let options = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed: number };
+        let method = VolumePath::new(&scene, options).unwrap();
+        let mut film = Film::new([8, 8], Window::full([8, 8])).unwrap();
+        let cancel = AtomicBool::new(false);
+        let job = Job { seed: number, passes: Some(16), time: None, cancel: &cancel };
+        let outcome = render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+        let walk = outcome.tally.walk;
+        (paths, lost) = (paths + walk.walks, lost + walk.losses.total());
+        assert!(walk.losses.total() as f64 <= TOLERATED * walk.walks as f64, "{:?} in {what}", walk.lost(&scene));
+        let pixels: Vec<f64> = film.image().pixels.iter().map(|p| f64::from(p.mean())).collect();
+        let mean = pixels.iter().sum::<f64>() / 64.0;
+        let error = (pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / 63.0 / 64.0).sqrt();
+        // f32 in a sum of a thousand.
+        assert!((mean - 1.0).abs() <= 5.0 * error + 1e-5, "{mean} +- {error} in {what}");
+        worst = worst.max((mean - 1.0).abs());
+    }
+    println!(
+        "{accepted} of {count} scenes accepted; {lost} of {paths} paths lost; furnaces off by {worst:.1e} at most"
+    );
+    assert!(accepted * 7 > count && accepted * 2 < count, "{accepted} of {count}");
+}
