@@ -93,7 +93,7 @@ fn traced(scene: &Scene, place: Place, backend: Backend, paths: u64) -> [(f64, f
     let n = paths as f64;
     // Where f32 is taken by force they are.
     let meant = scene.why_double.is_none() || mesh.precision == Precision::Double;
-    assert!(!meant || (tally.lost as f64) < 1e-4 * n, "{place:?}: {} paths lost", tally.lost);
+    assert!(!meant || (tally.losses.total() as f64) < 1e-4 * n, "{place:?}: {} paths lost", tally.losses.total());
     sums.map(|[sum, squares]| (sum / n, ((squares / n - (sum / n).powi(2)) / n).sqrt()))
 }
 

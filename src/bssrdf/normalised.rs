@@ -58,7 +58,8 @@ impl std::str::FromStr for WidthFit {
 ///
 /// S_d = R_d / π, over 4 C_phi(1/η) with exit normalisation [1/(unit² sr)]. All orders of scattering. Reciprocal.
 /// Fitted without a boundary: at η = 1 within 3 % of the truth, at 1.3 with the diffusion length 16 %, with the mean
-/// free path 35 %. R_d grows as 1/r towards 0 and is held constant below 1e-9 d.
+/// free path 35 %. R_d grows as 1/r towards 0; below 1e-9 d it is constant, at its
+/// mean over that disk, so that the total is A all the same.
 pub struct NormalisedDiffusion {
     channels: Channels<Width>,
     /// d [unit].
@@ -194,30 +195,32 @@ impl Channel for Width {
 impl Formula for Width {
     #[inline(always)]
     fn value(self, r2: f32) -> f32 {
-        let r = self.outside_core(r2);
+        let (r, over_r) = self.outside_core(r2);
         // exp(-r/6d): its square may leave the range of f32 where the product with the scale does not.
         let root = exp2(-(0.5 * self.decay_log2 * r));
         let y = root * root;
-        self.scale / r * (1.0 + y * y) * root * root
+        self.scale * over_r * (1.0 + y * y) * root * root
     }
 
     #[inline(always)]
     fn compensated(self, r2: f32, rate: f32) -> f32 {
-        let r = self.outside_core(r2);
+        let (r, over_r) = self.outside_core(r2);
         let root = exp2(-(0.5 * self.decay_log2 * r));
         let y = root * root;
         // exp(rate r) (y + y³) with the gain in the exponent.
         let gained = exp2(-(0.5 * left(self.decay_log2, rate * std::f32::consts::LOG2_E) * r));
-        self.scale / r * (1.0 + y * y) * gained * gained
+        self.scale * over_r * (1.0 + y * y) * gained * gained
     }
 }
 
 impl Width {
+    /// r for the exponentials and what stands for 1/r: within the core c its mean over the disk, ∫ 2πr/r dr / πc² = 2/c.
     #[inline(always)]
-    fn outside_core(self, r2: f32) -> f32 {
+    fn outside_core(self, r2: f32) -> (f32, f32) {
         let r = r2.sqrt();
-        let r = if r > self.core { r } else { self.core };
-        if r < 1e18 { r } else { 1e18 }
+        let r = if r < 1e18 { r } else { 1e18 };
+        let (inside, nearest) = (r < self.core, if r > self.core { r } else { self.core });
+        (r, if inside { 2.0 } else { 1.0 } / nearest)
     }
 }
 

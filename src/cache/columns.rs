@@ -31,12 +31,12 @@ impl Columns {
     /// `samples` for `model`, in their order.
     pub fn of(model: &Model, samples: &[CachedSample]) -> Self {
         let mut all = Self::new(model);
-        all.refill(model, samples);
+        all.refill(model, samples.iter());
         all
     }
 
     /// Becomes `samples`, in their order; `model` is that of the columns.
-    pub fn refill(&mut self, model: &Model, samples: &[CachedSample]) {
+    pub fn refill<'a>(&mut self, model: &Model, samples: impl ExactSizeIterator<Item = &'a CachedSample>) {
         for column in &mut self.columns[..self.used] {
             column.clear();
             column.reserve_exact(samples.len());
@@ -124,6 +124,18 @@ impl Columns {
             column.clear();
             if (3..LEAST).contains(&k) {
                 column.extend(picked.iter().map(|&(i, factor)| from[i as usize] * factor));
+            } else {
+                column.extend(picked.iter().map(|&(i, _)| from[i as usize]));
+            }
+        }
+    }
+
+    /// Becomes the samples `picked` of `other`, columns of the same model, each moved by a vector [unit].
+    pub fn pick_moved(&mut self, other: &Self, picked: &[(u32, Vec3)]) {
+        for (k, (column, from)) in self.columns[..self.used].iter_mut().zip(&other.columns).enumerate() {
+            column.clear();
+            if k < 3 {
+                column.extend(picked.iter().map(|&(i, by)| from[i as usize] + by[k]));
             } else {
                 column.extend(picked.iter().map(|&(i, _)| from[i as usize]));
             }

@@ -3,7 +3,6 @@
 
 use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally};
 use crate::bssrdf::{Exit, Partition};
-use crate::geometry::SurfacePoint;
 use crate::math::{DVec3, Frame, Rgb, Vec3};
 use crate::query::{Hit, Ray, RayTally};
 use crate::sampling::PixelStream;
@@ -31,12 +30,19 @@ const LIGHTS: u32 = 2;
 const AXES: [f32; 3] = [LINES as f32, 0.5, 0.5];
 /// Neighbouring exits that share what their lines find.
 const GROUP: usize = 8;
+/// Lines reach farther by so many units in the last place of the coordinates of their ends: near fields may be as small as
+/// the rounding of a ray.
+const SLACK_ULPS: f32 = 64.0 * f32::EPSILON;
 /// Surfaces that one line finds at most.
 const MOST_HITS: u32 = 64;
 /// What the numbers of lines parallel to the normal are for, and of those parallel to a tangent.
 const PURPOSES: [u64; 2] = [0x6e65_6172, 0x7369_6465];
 
 /// Samples of the near part of S_d on disks about exits, projected onto the surface [King et al. 2013].
+///
+/// What decides S_d and the density of the samples is the way from an exit to an entry, which may be far below the
+/// rounding of a place in f32 on a body of many mean free paths: ways are differences of places in f64, an entry that of the
+/// line itself on the plane of the triangle it meets, and S_d and density see the same way.
 pub struct NearField {
     /// What belongs to the near part.
     pub partition: Partition,
@@ -53,6 +59,10 @@ pub struct NearField {
 /// A line to look for surfaces along.
 struct Line {
     ray: Ray,
+    /// A point of it, before rounding.
+    through: DVec3,
+    /// The exit that it is about.
+    middle: DVec3,
     /// Its own numbers, those that placed it used up.
     numbers: PixelStream,
     /// The triangle that was found last.
@@ -63,9 +73,18 @@ struct Line {
 struct Candidate {
     /// Number of the surface that a line met.
     surface: u32,
-    at: SurfacePoint,
+    n_geometric: Vec3,
+    place: DVec3,
+    /// Its own place is nowhere: 0.
     sample: CachedSample,
     shadow: Option<Ray>,
+}
+
+/// Light that enters at a place.
+struct Found {
+    place: DVec3,
+    /// Its own place is nowhere: 0.
+    sample: CachedSample,
 }
 
 /// An exit and its axes, the normal first.
@@ -108,10 +127,9 @@ impl NearField {
         self.radius
     }
 
-    /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `exits` to `sums`; `streams`, one for each, have
-    /// its numbers. All surfaces found along lines parallel to the normals and tangents of neighbouring exits count for
-    /// each of them, over the density of all their lines together. `places` are the points of the exits in the scene: what is
-    /// found is kept relative to one of them, so that neither the size of the body nor that of the scene rounds distances.
+    /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `exits` to `sums`; `places` are the points of the
+    /// exits in the scene, and `streams`, one for each, have its numbers. All surfaces found along lines parallel to the
+    /// normals and tangents of neighbouring exits count for each of them, over the density of all their lines together.
     pub fn add(
         &self,
         filler: &Filler<'_>,
@@ -123,27 +141,26 @@ impl NearField {
         let (start, before) = (Instant::now(), clock.rays);
         let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model));
         let mut picked = Vec::new();
-        let groups = exits.chunks(GROUP).zip(places.chunks(GROUP)).zip(streams.chunks(GROUP));
-        for (((exits, places), streams), sums) in groups.zip(sums.chunks_mut(GROUP)) {
-            let middle = |(exit, place): (&Exit, &DVec3)| {
+        let groups = exits.chunks(GROUP).zip(places.chunks(GROUP));
+        for (((exits, places), streams), sums) in groups.zip(streams.chunks(GROUP)).zip(sums.chunks_mut(GROUP)) {
+            let middle = |(exit, &x): (&Exit, &DVec3)| {
                 let frame = Frame::about(exit.n);
-                Middle { x: *place, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
+                Middle { x, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
             };
             let middles: Vec<Middle> = exits.iter().zip(places).map(middle).collect();
-            let local = |(exit, place): (&Exit, &DVec3)| Exit { x: (*place - places[0]).as_vec3(), ..*exit };
-            let exits: Vec<Exit> = exits.iter().zip(places).map(local).collect();
             let candidates = self.along(filler, self.lines(&middles, streams), (&mut *rays, &mut *clock));
             let found = self.lit(filler, &middles, candidates, (&mut *rays, &mut *gather, &mut *clock));
             gather.near_points += found.len() as u64;
-            all.refill(filler.model, &found);
-            for (exit, sum) in exits.iter().zip(sums) {
-                // Beyond the radius the share is 0.
-                let within = |s: &CachedSample| s.entry.x.distance_squared(exit.x) < self.radius * self.radius;
+            all.refill(filler.model, found.iter().map(|f| &f.sample));
+            for ((exit, &place), sum) in exits.iter().zip(places).zip(sums) {
+                let exit = Exit { x: Vec3::ZERO, ..*exit };
                 picked.clear();
-                picked.extend((0_u32..).zip(&found).filter(|(_, s)| within(s)).map(|(i, _)| (i, 1.0)));
+                picked.extend((0_u32..).zip(&found).map(|(i, f)| (i, (f.place - place).as_vec3())));
+                // Beyond the radius the share is 0.
+                picked.retain(|(_, way)| way.length_squared() < self.radius * self.radius);
                 gather.near += picked.len() as u64;
-                own.pick(&all, &picked);
-                let value = own.sum(filler.model, exit, self.partition, &mut gather.clamped);
+                own.pick_moved(&all, &picked);
+                let value = own.sum(filler.model, &exit, self.partition, &mut gather.clamped);
                 *sum += Rgb::from_fn(|c| value[c] as f32);
             }
         }
@@ -172,11 +189,11 @@ impl NearField {
         let r2 = self.ring(u) * self.radius * self.radius;
         let (sin, cos) = (TAU * v).sin_cos();
         let (along, aside, other) = (axes[axis], axes[(axis + 1) % 3], axes[(axis + 2) % 3]);
-        let middle = (aside * cos + other * sin) * r2.sqrt();
+        let through = *x + ((aside * cos + other * sin) * r2.sqrt()).as_dvec3();
         let half = (self.radius * self.radius - r2).max(0.0).sqrt();
-        let origin = *x + (middle + along * half).as_dvec3();
-        let ray = Ray { t_max: 2.0 * half, ..Ray::new(origin, -along) };
-        (half > 0.0).then_some(Line { ray, numbers, last: None })
+        let reach = half + SLACK_ULPS * (through.abs().max_element() as f32 + half);
+        let ray = Ray { t_max: 2.0 * reach, ..Ray::new(through + (along * reach).as_dvec3(), -along) };
+        (half > 0.0).then_some(Line { ray, through, middle: *x, numbers, last: None })
     }
 
     /// What enters where the lines meet the object, all of them at once, surface after surface.
@@ -202,15 +219,25 @@ impl NearField {
                 // The next one may begin where this one is hit, but for rounding.
                 line.ray.t_min = hit.t.max(line.ray.t_min.next_up());
                 let again = line.last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
-                if !again && hit.mesh == filler.object {
-                    let at = filler.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
+                let mesh = &filler.scene.objects[hit.mesh as usize].mesh;
+                let crossing = || mesh.crossing(hit.triangle, line.through, line.ray.direction.as_dvec3());
+                let square = f64::from(self.radius) * f64::from(self.radius);
+                let near = |place: &DVec3| place.distance_squared(line.middle) <= square;
+                if !again
+                    && hit.mesh == filler.object
+                    && let Some(place) = crossing().filter(near)
+                {
+                    let at = mesh.point(hit.triangle, hit.u, hit.v);
                     surface += 1;
                     for part in 0..LIGHTS {
                         let mut numbers = line.numbers.split(part, LIGHTS);
                         let ([u, v, pick, share], depth) = (numbers.next_4d(), numbers.next_1d());
                         // The lights have the first two numbers, which are spread best: their noise is the largest.
                         let entering = filler.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], rays);
-                        candidates.extend(entering.map(|(sample, shadow)| Candidate { surface, at, sample, shadow }));
+                        candidates.extend(entering.map(|(mut sample, shadow)| {
+                            sample.entry.x = Vec3::ZERO;
+                            Candidate { surface, n_geometric: at.n_geometric, place, sample, shadow }
+                        }));
                     }
                     line.numbers.skip_split();
                 }
@@ -223,41 +250,40 @@ impl NearField {
         candidates
     }
 
-    /// Those candidates that nothing hides, over the density of all lines; relative to the first of `middles`.
+    /// Those candidates that nothing hides, over the density of all lines.
     fn lit(
         &self,
         filler: &Filler<'_>,
         middles: &[Middle],
         candidates: Vec<Candidate>,
         (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
-    ) -> Vec<CachedSample> {
+    ) -> Vec<Found> {
         let shadows: Vec<Ray> = candidates.iter().filter_map(|c| c.shadow).collect();
         let mut hidden = vec![false; shadows.len()];
         Clock::time(&mut clock.rays, || filler.rays.occluded_batch(&shadows, &mut hidden));
         rays.shadow += shadows.len() as u64;
         let mut hidden = hidden.into_iter();
-        let mut found: Vec<CachedSample> = Vec::with_capacity(candidates.len());
+        let mut found: Vec<Found> = Vec::with_capacity(candidates.len());
         let (mut last, mut density) = (0, 0.0);
         // Where the distance alone decides, all light at one point is one sample.
         let joined = filler.model.gather().is_some();
-        for Candidate { surface, at, mut sample, shadow } in candidates {
+        for Candidate { surface, n_geometric, place, mut sample, shadow } in candidates {
             if shadow.is_some() && hidden.next() == Some(true) {
                 continue;
             }
             let again = std::mem::replace(&mut last, surface) == surface;
             if !again {
-                density = self.density(middles, &at);
+                density = self.density(middles, place, n_geometric);
             }
             // At the rim of the near field, by rounding; its share is 0 there.
             if density == 0.0 {
                 continue;
             }
             sample.flux *= 1.0 / density;
-            sample.entry.x = (at.x - middles[0].x).as_vec3();
             match found.last_mut().filter(|_| again && joined) {
                 _ if !sample.is_finite() => (gather.non_finite, last) = (gather.non_finite + 1, 0),
-                Some(same) => same.flux += sample.flux,
-                None => found.push(sample),
+                Some(same) => same.sample.flux += sample.flux,
+                None => found.push(Found { place, sample }),
             }
         }
         found
@@ -271,19 +297,19 @@ impl NearField {
         inner2 + within * (outer2(k) as f32 - inner2)
     }
 
-    /// Number of times that the lines of all exits meet the surface at `at`, per area [1/unit²].
-    fn density(&self, middles: &[Middle], at: &SurfacePoint) -> f32 {
+    /// Number of times that the lines of all exits meet the surface at `place`, per area [1/unit²].
+    fn density(&self, middles: &[Middle], place: DVec3, n_geometric: Vec3) -> f32 {
         let scale = 1.0 / (self.radius * self.radius);
         let mut density = 0.0;
         for Middle { x, axes } in middles {
-            let apart = (at.x - *x).as_vec3();
+            let apart = (place - *x).as_vec3();
             let r2 = apart.length_squared();
             if r2 * scale > 1.0 {
                 continue;
             }
             for (axis, number) in axes.iter().zip(AXES) {
                 let q = (apart - *axis * apart.dot(*axis)).length_squared() * scale;
-                density += number * self.per_area[ring_of(q)] * at.n_geometric.dot(*axis).abs();
+                density += number * self.per_area[ring_of(q)] * n_geometric.dot(*axis).abs();
             }
         }
         density

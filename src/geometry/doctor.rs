@@ -28,6 +28,9 @@ pub struct Findings {
     /// Enclosed volume [unit³], below zero if the faces look inwards; `None` where the surface has a rim, or faces of
     /// mixed directions.
     pub volume: Option<f64>,
+    /// Integral of the mean curvature over the surface [unit], above 0 on a convex body: half the sum over edges of length
+    /// times angle [Steiner]. With [`Self::volume`].
+    pub bend: Option<f64>,
 }
 
 impl Findings {
@@ -54,7 +57,8 @@ pub fn examine(mesh: &Mesh) -> Findings {
         ..Findings::default()
     };
     let mut open = Vec::new();
-    for uses in faces.edges().chunk_by(|a, b| a.0 >> 1 == b.0 >> 1) {
+    let edges = faces.edges();
+    for uses in edges.chunk_by(|a, b| a.0 >> 1 == b.0 >> 1) {
         match uses {
             [edge] => open.push(ends(edge)),
             [a, b] => found.mixed_edges += usize::from(a.0 == b.0),
@@ -66,8 +70,26 @@ pub fn examine(mesh: &Mesh) -> Findings {
     if found.open_edges == 0 && found.mixed_edges == 0 && !faces.kept.is_empty() {
         let all: Vec<[u32; 3]> = faces.kept.iter().map(|&t| faces.corners[t as usize]).collect();
         found.volume = Some(volume(&all, &point));
+        found.bend = Some(bend(&faces, &edges, &point));
     }
     found
+}
+
+/// See [`Findings::bend`]; edges of more than two triangles are left out.
+fn bend(faces: &Faces, edges: &[Edge], point: &impl Fn(u32) -> DVec3) -> f64 {
+    let corners = |t: u32| faces.corners[t as usize].map(point);
+    let normal = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a).normalize_or_zero();
+    let edge = |uses: &[Edge]| {
+        let [(key, a), (_, b)] = *uses else { return 0.0 };
+        let (this, that) = (corners(a), corners(b));
+        let [from, to] = [key >> 32, (key & u64::from(u32::MAX)) >> 1].map(|i| point(i as u32));
+        let (n, m) = (normal(this), normal(that));
+        // Convex where the other triangle lies below this one's plane.
+        let middle = (that[0] + that[1] + that[2]) / 3.0;
+        let side = -(middle - from).dot(n);
+        (to - from).length() * n.cross(m).length().atan2(n.dot(m)).copysign(side)
+    };
+    0.5 * edges.chunk_by(|a, b| a.0 >> 1 == b.0 >> 1).map(edge).sum::<f64>()
 }
 
 /// What [`mended`] did.
@@ -333,7 +355,7 @@ mod tests {
     fn a_sound_mesh_has_no_findings_and_stays_as_it_is() {
         let mesh = ball(2.0);
         let found = seen(&mesh);
-        assert_eq!(found, Findings { triangles: 168, volume: found.volume, ..Findings::default() });
+        assert_eq!(found, Findings { triangles: 168, volume: found.volume, bend: found.bend, ..Findings::default() });
         assert!((found.volume.unwrap() / (4.0 / 3.0 * std::f64::consts::PI * 8.0) - 1.0).abs() < 0.2);
         assert!(!found.can_be_mended() && !found.inside_out());
         let (same, done) = mended(mesh.clone());
@@ -365,7 +387,10 @@ mod tests {
             triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
             ..ObjMesh::default()
         };
-        assert_eq!(seen(&soup), seen(&mesh));
+        let (soup, mesh) = (seen(&soup), seen(&mesh));
+        // Edges are added up in another order.
+        assert!((soup.bend.unwrap() / mesh.bend.unwrap() - 1.0).abs() < 1e-12);
+        assert_eq!(Findings { bend: mesh.bend, ..soup }, mesh);
     }
 
     #[test]

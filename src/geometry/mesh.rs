@@ -108,6 +108,13 @@ impl Mesh {
         }
     }
 
+    /// Where the line through `origin` along `direction` meets the plane of a triangle; `None` where it does not.
+    pub fn crossing(&self, triangle: u32, origin: DVec3, direction: DVec3) -> Option<DVec3> {
+        let n = self.scaled_normal(triangle);
+        let t = (self.corners(triangle)[0] - origin).dot(n) / direction.dot(n);
+        t.is_finite().then(|| origin + direction * t)
+    }
+
     /// Interpolated normal, kept on the side of `n_geometric`; the geometric one where there is none or
     /// where the file's normals cancel.
     fn shading_normal(&self, triangle: u32, u: f32, v: f32, n_geometric: Vec3) -> Vec3 {

@@ -5,6 +5,7 @@
 
 mod camera;
 mod doctor;
+mod energy;
 mod environment;
 mod file;
 mod load;

@@ -2,7 +2,7 @@
 
 use super::file::SceneFile;
 use super::options::MethodName;
-use super::{Scene, Surface, Translucent};
+use super::{Scene, Surface, Translucent, energy};
 use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::optics::{ChannelOptics, Trust};
 
@@ -83,6 +83,12 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             && let Some((lo, hi)) = object.mesh.bounds()
         {
             said.extend(thin(t, (hi - lo).length()).map(|what| format!("{head}: {what}")));
+            if file.method.name.is_none_or(|name| name == MethodName::Subsurface) {
+                let material = &scene.materials[object.material].name;
+                said.extend(
+                    energy::of(t, object).into_iter().map(|what| format!("{head}: material {material:?}: {what}")),
+                );
+            }
         }
     }
 }

@@ -3,11 +3,13 @@
 use marmor::ErrorKind;
 use marmor::bssrdf::ModelName;
 use marmor::film::{Counts, Film, Image, Window};
-use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View};
+use marmor::integrator::{
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions,
+};
 use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
+use marmor::render::{Job, run};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
+use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -116,7 +118,7 @@ pub fn backends() -> impl Iterator<Item = Backend> {
 /// Options of the case's subsurface renders.
 pub fn subsurface(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
     SubsurfaceOptions {
-        single: false,
+        single: true,
         cache_samples,
         estimator,
         cut_error: Some(0.1),
@@ -129,20 +131,21 @@ pub fn subsurface(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions
     }
 }
 
-fn shot<I: Integrator>(integrator: &I, scene: &Scene, backend: Backend, what: String) -> Shot {
+/// The film of some passes, and what they cost.
+pub fn render<I: Integrator>(integrator: &I, scene: &Scene, backend: Backend, seed: u64, passes: u32) -> (Film, Tally) {
     let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
     let rays = query::build(backend, &meshes).unwrap();
     let resolution = scene.camera.resolution;
     let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
     let cancel = AtomicBool::new(false);
-    let job = Job { seed: 1, passes: Some(2), time: None, cancel: &cancel };
-    let outcome = render::run(integrator, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-    Shot {
-        image: film.image(),
-        counts: film.counts(),
-        tally: outcome.tally,
-        what: format!("{what} on {}", backend.name()),
-    }
+    let job = Job { seed, passes: Some(passes), time: None, cancel: &cancel };
+    let outcome = run(integrator, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    (film, outcome.tally)
+}
+
+fn shot<I: Integrator>(integrator: &I, scene: &Scene, backend: Backend, what: String) -> Shot {
+    let (film, tally) = render(integrator, scene, backend, 1, 2);
+    Shot { image: film.image(), counts: film.counts(), tally, what: format!("{what} on {}", backend.name()) }
 }
 
 /// Every method on every backend.
@@ -157,6 +160,11 @@ pub fn shots(scene: &Scene) -> Vec<Shot> {
             [(Estimator::Cut, 2000), (Estimator::All, 200), (Estimator::Notes, 200), (Estimator::Thinned, 2000)]
         {
             all.push(subsurface_shot(scene, estimator, samples, backend));
+        }
+        // Media in one another have no paths.
+        let traced = VolumePathOptions { orders: Orders::All, photons: 50, specular: true, seed: 1 };
+        if let Ok(method) = VolumePath::new(scene, traced) {
+            all.push(shot(&method, scene, backend, "volume_path".into()));
         }
     }
     all

@@ -1,6 +1,11 @@
 //! Lights at the ends of what there is.
 
-use super::harness::{load, ok, shots, warns, with};
+use super::furnace::{self, ERRORS};
+use super::harness::{load, medium, ok, shots, warns, with};
+use marmor::bssrdf::ModelName;
+use marmor::integrator::{VolumePath, VolumePathOptions};
+use marmor::query::Backend;
+use marmor::scene::{Estimator, Orders};
 
 #[test]
 fn a_light_without_area_warns() {
@@ -91,4 +96,32 @@ fn a_light_of_1e_minus_12_units_warns() {
     let scene = load(&text).unwrap();
     assert!(scene.warnings.iter().any(|w| w.contains("steps of") || w.contains("no area")), "{:?}", scene.warnings);
     shots(&scene).iter().for_each(super::harness::Shot::assert_sound);
+}
+
+/// A lamp and an environment of radiance 1 over a white floor: nothing is brighter, but by what a model claims.
+#[test]
+fn no_more_light_than_the_brightest_source_ok() {
+    let text = medium("[20, 30, 40]", "[0.05, 0.1, 0.2]", "eta = 1.3");
+    let text = [("radiance = 5", "radiance = 1"), ("radiance = 0.1", "radiance = 1"), ("albedo = 0.5", "albedo = 1")]
+        .iter()
+        .fold(text, |text, (from, to)| text.replacen(from, to, 1));
+    let mut found = Vec::new();
+    for name in [ModelName::Standard, ModelName::Better, ModelName::Directional, ModelName::Beam, ModelName::Normalised]
+    {
+        let scene = load(&text.replace("eta = 1.3", &format!("eta = 1.3\nmodel = \"{}\"", name.name()))).unwrap();
+        let mean = furnace::by(&scene, Backend::preferred(), Estimator::Cut, true);
+        found.push((name.name(), mean, furnace::most(furnace::translucent(&scene))));
+    }
+    let scene = load(&text).unwrap();
+    let of = |seed| {
+        let options = VolumePathOptions { orders: Orders::All, photons: 200, specular: true, seed };
+        VolumePath::new(&scene, options).unwrap()
+    };
+    found.push(("volume_path", furnace::seen(&scene, Backend::preferred(), 4, of), 1.0));
+    for (what, mean, most) in found {
+        for (mean, error) in mean {
+            assert!(error < 0.05 && mean > 0.3, "{what}: {mean} +- {error}");
+            assert!(mean < most + ERRORS * error + 1e-4, "{what}: {mean} +- {error} of {most}");
+        }
+    }
 }

@@ -1,0 +1,221 @@
+//! Where a model sends out more light than has entered, by its own nature or by the shape it is used on: said before a
+//! render, with the factor and a remedy.
+
+use super::{Object, Translucent};
+use crate::bssrdf::{Bssrdf, Model, ModelName, ModelVisitor, Place, SingleScattering, expected_error};
+use crate::math::Rgb;
+use crate::optics::{ChannelOptics, Medium};
+
+/// Excess of light that is said. On a plane, models of a half space err by up to 0.12 themselves (`beam` at η = 1).
+const EXCESS: f64 = 0.15;
+/// A slab is another one where its thickness differs from the body's by more than this factor.
+const OTHER_SLAB: f64 = 1.25;
+/// Thickness from which `slab` is to be trusted [transport mean free paths].
+const SLAB_FROM: f64 = 2.0;
+
+/// What is to say of the energy of an object's model; nothing where it is as good as on a plane.
+pub(super) fn of(t: &Translucent, object: &Object) -> Vec<String> {
+    let Ok(model) = t.build() else { return Vec::new() };
+    let shape = Shape::of(object);
+    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &model, shape));
+    // A thin body is the larger error, and has one remedy.
+    let nature = if sheet.is_none() { by_nature(t, &model) } else { None };
+    sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &model, &shape))).collect()
+}
+
+/// The sheet, rod or ball that a closed body is most like, from volume V, area S and the mean M of the curvature over it, all of
+/// the mesh itself: 2V/S is the thickness of a sheet, the radius of a rod, two thirds of the radius of a ball, and 2V/S M
+/// is 0, 1/2, 2/3.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shape {
+    /// Way through it along the normal [unit].
+    pub thickness: f64,
+    /// Mean curvature [1/unit]: 0 of a sheet, 1/2r of a rod, 1/r of a ball.
+    pub curvature: f64,
+}
+
+impl Shape {
+    /// `None` for a mesh that encloses nothing.
+    pub fn of(object: &Object) -> Option<Self> {
+        let found = &object.findings;
+        let (volume, bend) = (found.volume.filter(|v| *v > 0.0)?, found.bend?);
+        let mesh = &object.mesh;
+        let area: f64 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
+        let (lo, hi) = mesh.bounds()?;
+        let shortest = (hi - lo).min_element();
+        let (sheet, curvature) = (2.0 * volume / area, bend / area);
+        // Convex bodies have at most 2/3 [Minkowski].
+        let round = (sheet * curvature).clamp(0.0, 2.0 / 3.0);
+        let thickness = (sheet / (1.0 - round)).min(shortest);
+        thickness.is_finite().then_some(Self { thickness, curvature: round / sheet })
+    }
+}
+
+const CHANNELS: [&str; 3] = ["red", "green", "blue"];
+
+/// The largest of a number of each channel, and in words which channel's it is, where they differ.
+fn largest(medium: &Medium, values: impl Iterator<Item = (usize, f64)>) -> Option<(String, f64)> {
+    let (c, value) = values.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some((if medium.is_grey() { String::new() } else { format!(" in {}", CHANNELS[c]) }, value))
+}
+
+/// A model of a half space lets light out through both faces of a sheet as if each were the only one.
+fn too_thin(t: &Translucent, model: &Model, shape: &Shape) -> Option<String> {
+    if model.name() == ModelName::Slab {
+        return None;
+    }
+    let (eta, optics) = (f64::from(t.medium.eta), ChannelOptics::of(&t.medium));
+    let scatters = |k: &ChannelOptics| k.alpha_prime > 0.0;
+    let here = |k: &ChannelOptics| {
+        expected_error(model.name(), t.calibrated, &Place::new(k, eta, shape.thickness, shape.curvature))
+    };
+    let factor = |k: &ChannelOptics| 1.0 + here(k).total;
+    let plane = |k: &ChannelOptics| {
+        1.0 + expected_error(model.name(), t.calibrated, &Place::new(k, eta, f64::INFINITY, 0.0)).total
+    };
+    let each = || optics.iter().enumerate().filter(|(_, k)| scatters(k));
+    let thickness = shape.thickness;
+    let path = each().map(|(_, k)| k.transport_mean_free_path).fold(0.0, f64::max);
+    let head = format!(
+        "`{}` is a model of a half space, and the body is some {thickness:.4} units thick, {:.2} transport mean free paths",
+        model.name().name(),
+        thickness / path
+    );
+    // Worse than the same medium in a body without end.
+    let brighter = largest(&t.medium, each().filter(|(_, k)| factor(k) > plane(k)).map(|(c, k)| (c, factor(k))));
+    if let Some((channel, factor)) = brighter.filter(|(_, factor)| *factor > 1.0 + EXCESS) {
+        let slab = if thickness > SLAB_FROM * path {
+            format!(", or model `slab` with thickness = {thickness:.4} if it is flat")
+        } else {
+            String::new()
+        };
+        return Some(format!(
+            "{head}: where all sides are lit it sends out up to {factor:.2} times the light that it should{channel}; take \
+             method `volume_path`{slab}"
+        ));
+    }
+    let (channel, error) = largest(&t.medium, each().map(|(c, k)| (c, here(k).distribution)))?;
+    (thickness < path).then(|| {
+        format!(
+            "{head}: {:.0} % of the light comes out in the wrong places{channel}; take method `volume_path`",
+            100.0 * error
+        )
+    })
+}
+
+/// More than all of the light, on a plane and without any absorption: `directional` as published, and models that add
+/// single scattering to a sum of all other orders that knows nothing of the phase function.
+fn by_nature(t: &Translucent, model: &Model) -> Option<String> {
+    let clear = Translucent { medium: Medium { sigma_a: Rgb::BLACK, ..t.medium }, model: model.name(), ..t.clone() };
+    let total = furnace(&clear.medium, &clear.build().ok()?);
+    let (channel, factor) = largest(&t.medium, (0..3).map(|c| (c, f64::from(total[c]))))?;
+    (factor > 1.0 + EXCESS).then(|| {
+        let name = model.name().name();
+        let (why, remedy) = if model.name() == ModelName::Directional {
+            ("as published".to_string(), "set calibrated = true, or take model `beam`")
+        } else {
+            let why = format!("with single scattering beside it, at g = {} and eta = {}", t.medium.g, t.medium.eta);
+            (why, "take method `volume_path`, or model `standard`, which has all orders and no more than all light")
+        };
+        format!(
+            "`{name}` {why} does not conserve energy: of a plane of this medium without absorption {factor:.2} times the \
+             light that has entered comes back{channel}, and with absorption it is too bright as well; {remedy}"
+        )
+    })
+}
+
+/// What comes back of what has entered a plane along the normal, single scattering included where the renderer adds it.
+fn furnace(medium: &Medium, model: &Model) -> Rgb {
+    struct Total;
+    impl ModelVisitor for Total {
+        type Out = (Rgb, bool);
+        fn visit<B: Bssrdf>(self, model: &B) -> (Rgb, bool) {
+            (model.total(), model.claims().first_order)
+        }
+    }
+    let (total, first_order) = model.visit(Total);
+    if first_order { total } else { total + SingleScattering::new(medium).total() }
+}
+
+/// A slab of another thickness than the body's.
+fn other_slab(t: &Translucent, model: &Model, shape: &Shape) -> Option<String> {
+    let told = f64::from(t.thickness.filter(|_| model.name() == ModelName::Slab)?);
+    let ratio = told / shape.thickness;
+    (!(1.0 / OTHER_SLAB..=OTHER_SLAB).contains(&ratio)).then(|| {
+        format!(
+            "`slab` is told a thickness of {told:.4} units, and the body is some {:.4} units thick: what it reflects and lets \
+             through is that of another sheet; set `thickness`, or take method `volume_path`",
+            shape.thickness
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{examine, rectangle, sphere};
+    use crate::math::DVec3;
+    use std::f64::consts::PI;
+
+    fn object(mesh: &crate::geometry::ObjMesh) -> Object {
+        let mesh = mesh.recentred(DVec3::ZERO);
+        let findings = examine(&mesh);
+        Object { name: String::new(), mesh, material: 0, findings }
+    }
+
+    /// Six rectangles, their corners at the same places.
+    fn cuboid(half: [f64; 3]) -> Object {
+        let mut all = crate::geometry::ObjMesh::default();
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                let along = |i: usize| DVec3::from_array(std::array::from_fn(|k| if k == i { half[k] } else { 0.0 }));
+                let (u, v) = (along((axis + 1) % 3), along((axis + 2) % 3));
+                let face = rectangle(along(axis) * side, u * side, v);
+                let base = all.positions.len() as u32;
+                all.positions.extend(&face.positions);
+                all.triangles.extend(face.triangles.iter().map(|t| t.map(|i| base + i)));
+            }
+        }
+        object(&all)
+    }
+
+    #[test]
+    fn sheets_rods_and_balls_have_their_thickness_and_curvature() {
+        let of = |object: &Object| Shape::of(object).unwrap();
+        let close = |a: f64, b: f64| (a - b).abs() < 0.03 * b.abs() + 1e-3;
+        let ball = of(&object(&sphere(DVec3::ONE, 2.0, 48, 96)));
+        assert!(close(ball.thickness, 4.0) && close(ball.curvature, 0.5), "{ball:?}");
+        let sheet = of(&cuboid([100.0, 0.1, 100.0]));
+        assert!(close(sheet.thickness, 0.2) && sheet.curvature < 0.02, "{sheet:?}");
+        // A square rod of width w: 2V/S = w/2, M/S = π/4w.
+        let rod = of(&cuboid([1.0, 300.0, 1.0]));
+        assert!(close(rod.thickness, 1.0 / (1.0 - PI / 8.0)) && close(rod.curvature, PI / 8.0), "{rod:?}");
+        // ∫ H dA of a box is π times the sum of its edges.
+        let found = cuboid([1.0, 2.0, 3.0]).findings;
+        assert!((found.bend.unwrap() / (12.0 * PI) - 1.0).abs() < 1e-6, "{found:?}");
+        assert_eq!(Shape::of(&object(&rectangle(DVec3::ZERO, DVec3::X, DVec3::Y))), None);
+    }
+
+    #[test]
+    fn what_is_thick_and_flat_in_a_plain_medium_is_not_said() {
+        let medium = Medium::reduced(Rgb::splat(2.0), Rgb::splat(0.01), 1.3).unwrap();
+        let of = |model| Translucent {
+            medium,
+            model,
+            thickness: None,
+            calibrated: false,
+            exit_normalisation: true,
+            source: String::new(),
+        };
+        let (thick, thin) = (cuboid([50.0, 20.0, 50.0]), cuboid([50.0, 0.2, 50.0]));
+        for model in [ModelName::Standard, ModelName::Better, ModelName::Beam, ModelName::Normalised, ModelName::Auto] {
+            assert_eq!(super::of(&of(model), &thick), Vec::<String>::new(), "{model:?}");
+            let said = super::of(&of(model), &thin).join("\n");
+            assert!(
+                said.contains("model of a half space") && said.contains("0.80 transport mean free paths"),
+                "{said}"
+            );
+        }
+        assert!(super::of(&of(ModelName::Directional), &thick)[0].contains("1.24 times"));
+    }
+}
