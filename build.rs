@@ -1,12 +1,51 @@
-//! Compiles `wrapper/` against Embree 3 or 4 and writes its Rust declarations. Without the feature `embree` it does nothing.
+//! Names the build (`MARMOR_BUILD`: a hash of what decides a bit of a picture), and compiles `wrapper/` against Embree 3 or 4
+//! and writes its Rust declarations: the latter with the feature `embree` alone.
 //!
 //! Embree is looked for below `EMBREE_DIR` (`include/` and `lib/`) if that is set, else where the C compiler looks.
 
+use std::path::{Path, PathBuf};
+
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rustc-env=MARMOR_BUILD={:016x}", fingerprint());
     #[cfg(feature = "embree")]
     if let Err(message) = embree::build() {
         println!("cargo::error={message}");
+    }
+}
+
+/// FNV-1a over the sources, the locked dependencies, the target and the compiler. Neither time, folder, features nor
+/// profile are in it: they change no picture.
+fn fingerprint() -> u64 {
+    let mut files = vec![PathBuf::from("Cargo.lock")];
+    list(Path::new("src"), &mut files);
+    list(Path::new("wrapper"), &mut files);
+    files.sort();
+    let variable = |name: &str| std::env::var(name).unwrap_or_default();
+    let compiler = std::process::Command::new(variable("RUSTC")).arg("--version").output();
+    let mut parts = vec![variable("TARGET").into_bytes(), compiler.map(|o| o.stdout).unwrap_or_default()];
+    for file in files {
+        // A package from a registry has no Cargo.lock of its own.
+        let Ok(bytes) = std::fs::read(&file) else { continue };
+        parts.extend([file.display().to_string().replace('\\', "/").into_bytes(), bytes]);
+    }
+    for folder in ["Cargo.lock", "src", "wrapper"] {
+        println!("cargo::rerun-if-changed={folder}");
+    }
+    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    for part in parts {
+        for byte in (part.len() as u64).to_le_bytes().iter().chain(&part) {
+            hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    hash
+}
+
+/// All files below `folder`.
+fn list(folder: &Path, into: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() { list(&path, into) } else { into.push(path) }
     }
 }
 
@@ -28,7 +67,6 @@ mod embree {
 
     pub fn build() -> Result<(), String> {
         println!("cargo::rerun-if-env-changed=EMBREE_DIR");
-        println!("cargo::rerun-if-changed=wrapper");
         let place = match std::env::var_os("EMBREE_DIR").filter(|dir| !dir.is_empty()) {
             Some(dir) => find_below(Path::new(&dir))?,
             None => find_in_system()?,

@@ -109,7 +109,7 @@ impl Bench<'_> {
         let cancel = AtomicBool::new(false);
         let job = Job { seed, passes, time: Some(Duration::from_secs_f64(seconds)), cancel: &cancel };
         let outcome = render::resume(integrator, self.view, &job, &mut run.film, run.spent, &mut []).unwrap();
-        run.spent = Spent { seconds: outcome.seconds, tally: outcome.tally };
+        run.spent = Spent { setup: 0.0, seconds: outcome.seconds, tally: outcome.tally };
     }
 
     fn error(&self, film: &Film, reference: &Image) -> f64 {

@@ -11,7 +11,7 @@
 //! | 4 | [`scene`]: the file as typed, and the checked world |
 //! | 3 | [`query`]: nearest hit · [`bssrdf`]: one file per model · [`film`]: sums, EXR, PNG, metrics |
 //! | 2 | [`geometry`]: meshes, area table · [`optics`]: Fresnel, media · [`sampling`]: Owen-Sobol streams |
-//! | 1 | [`math`], [`error`], [`memory`] |
+//! | 1 | [`math`], [`error`], [`memory`], [`input`] |
 //!
 //! The command line is the binary's own room, `cli`, above all of these.
 #![deny(unsafe_code)]
@@ -26,6 +26,7 @@ pub mod cache;
 pub mod error;
 pub mod film;
 pub mod geometry;
+pub mod input;
 pub mod integrator;
 pub mod light;
 pub mod math;

@@ -15,6 +15,13 @@ pub fn available() -> Option<u64> {
     free.into_iter().chain(left_by_groups(&groups, Path::new("/sys/fs/cgroup"))).chain(own).min()
 }
 
+/// The most memory that this process had at any time [bytes], where the system tells (Linux).
+pub fn peak() -> Option<u64> {
+    let status = read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kib| kib * 1024)
+}
+
 /// What the limit on addresses leaves; `None` without one.
 fn left_by_limit(limits: &str, status: &str) -> Option<u64> {
     let line = limits.lines().find_map(|line| line.strip_prefix("Max address space"))?;

@@ -172,6 +172,21 @@ fn sizes_are_checked_before_memory_is_taken() {
     assert!(error.to_string().contains("too small for its picture"), "{error}");
 }
 
+/// A scene of many objects is a long header: what is written can be read.
+#[test]
+fn a_long_scene_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.film");
+    let mut long = identity();
+    long.0.push(("scene of many".into(), "x = 1\n".repeat(4 << 20)));
+    Checkpoint::write(&path, &film(0..1), &long, &[], serde_json::json!({})).unwrap();
+    let read = Checkpoint::read(&path).unwrap();
+    assert!(read.identity == long && read.film == film(0..1));
+    // 100 000 facts are compared one by one, not each with all.
+    let many = |last: usize| Identity((0..100_000).map(|i| (format!("mesh of {i}"), (i / last).to_string())).collect());
+    assert_eq!(many(99_999).difference(&many(99_998)).as_deref(), Some("mesh of 99998: `0` there, `1` here"));
+}
+
 #[test]
 #[ignore = "a measurement: cargo test --release --test film_files -- --ignored --nocapture"]
 fn time_of_exact_sums() {

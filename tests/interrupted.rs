@@ -162,7 +162,12 @@ fn a_render_is_resumed_by_the_same_call_alone() {
     refused(folder, &with(&["--seed", "3"]), 2, &["x.film", "seed: `0` there, `3` here"]);
     refused(folder, &with(&["--method", "direct"]), 2, &["method: `subsurface` there, `direct` here"]);
     refused(folder, &with(&["--crop", "0,0,9,9"]), 2, &["picture:"]);
-    refused(folder, &with(&["-D", "camera.fov=31"]), 2, &["scene, line", "`fov = 30` there, `fov = 31` here"]);
+    refused(
+        folder,
+        &with(&["-D", "camera.fov=31"]),
+        2,
+        &["scene.toml with -D camera.fov=31", "`camera.fov` is 31 here, 30 in the film"],
+    );
     refused(folder, &with(&["--as-notes"]), 2, &["the lecture's form"]);
     refused(folder, &[&again[..], &["2"]].concat(), 2, &["passes 0..3, but 0..2"]);
     let mesh = fs::read_to_string(folder.join("floor.obj")).unwrap();
@@ -222,4 +227,31 @@ fn a_replay_shows_the_sample_of_the_render() {
         }
     }
     refused(folder, &["render", "scene.toml", "--pixel", "40,3"], 2, &["not in the picture"]);
+}
+
+/// The first pass is finished, the picture is written without what it cannot have yet, and the exit code is that of an
+/// interruption.
+#[test]
+fn an_interruption_in_the_first_pass_is_an_interruption() {
+    let folder = folder();
+    let folder = folder.path();
+    let slow = ["-D", "method.cache_samples=100000", "-D", "method.estimator=notes"];
+    let call = ["render", "scene.toml", "-o", "x.exr", "--layers", "variance,Z", "--spp", "40"];
+    let child = command(folder, &[&call[..], &slow].concat()).stderr(Stdio::piped()).spawn().unwrap();
+    // Once it listens for signals; before, SIGTERM ends any program.
+    let status = format!("/proc/{}/status", child.id());
+    wait_for(|| {
+        let text = fs::read_to_string(&status).unwrap_or_default();
+        let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap_or_default();
+        u64::from_str_radix(caught.trim(), 16).is_ok_and(|caught| caught & (1 << 14) != 0)
+    });
+    signal(&child, "TERM");
+    let output = child.wait_with_output().unwrap();
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(75), "{told}");
+    assert!(told.contains("--layers variance is left out"), "{told}");
+    marmor::film::Image::read_exr(&folder.join("x.exr")).unwrap();
+    assert_eq!(marmor::film::Checkpoint::read(&folder.join("x.film")).unwrap().film.passes(), 1);
+    refused(folder, &["render", "scene.toml", "-o", "y.exr", "--layers", "variance", "--spp", "1"], 2, &["at least 2"]);
+    refused(folder, &["render", "scene.toml", "-o", "y.png", "--layers", "Z"], 2, &["only an EXR holds layers"]);
 }

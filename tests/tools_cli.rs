@@ -262,6 +262,34 @@ fn eval_may_go_on_past_bad_rows() {
     assert_eq!((lines.len(), lines[1], lines[3]), (5, lines[4], "1,0.1,0,1.3,-3,,"));
 }
 
+/// A line that may never end is not read to its end, whether rows may be bad or not; what came before it is written.
+#[test]
+fn eval_ends_at_a_line_without_end() {
+    let rows = format!("sigma_s,sigma_a,g,eta,r\n1,0.1,0,1.3,2\n{}", "1".repeat(3 << 20));
+    for more in [&[][..], &["--keep-going"]] {
+        let output = marmor(&[&["eval", "--model", "standard"], more].concat(), &rows);
+        assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
+        assert!(stderr(&output).contains("standard input, line 3: longer than 1048576 bytes"), "{}", stderr(&output));
+        assert_eq!(String::from_utf8(output.stdout).unwrap().lines().count(), 2);
+    }
+}
+
+/// Appended to its own input, it would never come to an end.
+#[cfg(unix)]
+#[test]
+fn eval_does_not_read_what_it_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("rows.csv");
+    let rows = "sigma_s,sigma_a,g,eta,r\n1,0.1,0,1.3,2\n";
+    std::fs::write(&path, rows).unwrap();
+    let open = || std::fs::File::options().read(true).append(true).open(&path).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_marmor"));
+    let output = command.args(["eval", "--model", "standard"]).stdin(open()).stdout(open()).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("the file that the rows come from"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), rows);
+}
+
 #[test]
 fn materials_lists_every_row_and_its_doubts() {
     let table = stdout(&marmor(&["materials"], ""));

@@ -1,8 +1,10 @@
 //! `marmor check`: what is in a scene, what will be built, and what is left out.
 
+use super::files::{Files, Remedy};
+use super::need;
 use super::setup::{MethodArgs, prepare};
 use marmor::Result;
-use marmor::film::{Film, write_atomically};
+use marmor::film::{Window, check_replaceable, write_atomically};
 use marmor::geometry::{Mended, Mesh, load_obj, mended, write_obj};
 use marmor::integrator::{LocalShape, TOLERANCE, Trustworthiness, View};
 use marmor::optics::Medium;
@@ -22,7 +24,7 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER")]
     write_mended: Option<PathBuf>,
     /// What counts as wrong where models are judged, as a share of the light
-    #[arg(long, value_name = "E", default_value_t = TOLERANCE)]
+    #[arg(long, value_name = "E", default_value_t = TOLERANCE, value_parser = tolerance)]
     tolerance: f64,
     /// Print one JSON object instead of a text
     #[arg(long)]
@@ -38,11 +40,14 @@ pub fn run(args: Args) -> Result<ExitCode> {
     }
     let parts = prepared.method.parts(scene);
     let [width, height] = scene.camera.resolution;
-    let pixels = width as usize * height as usize;
-    let film_bytes = pixels * Film::BYTES_PER_PIXEL;
-    let picture_bytes = pixels * BYTES_PER_PIXEL_OF_PICTURES;
     let available = marmor::memory::available();
-    let trust = trust(&prepared, args.tolerance)?;
+    // For the models and for what a pass takes; where nothing is translucent there is nothing to ask.
+    let translucent = scene.materials.iter().any(|m| matches!(m.surface, Surface::Translucent(_)));
+    let meshes = scene.meshes();
+    let rays = translucent.then(|| query::build(prepared.backend, &meshes)).transpose()?;
+    let view = rays.as_ref().map(|rays| View { scene, rays: &**rays });
+    let need = need::of(&prepared, Window::full([width, height]), view);
+    let trust = view.map_or(Vec::new(), |view| trust(view, args.tolerance));
     if args.json {
         let objects: Vec<Value> = scene.objects.iter().map(|o| object_json(scene, o)).collect();
         let report = json!({
@@ -58,8 +63,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
                 value["sentence"] = t.sentence().into();
                 value
             }).collect::<Vec<_>>(),
-            "film_bytes": film_bytes,
-            "picture_bytes": picture_bytes,
+            "film_bytes": need.film,
+            "picture_bytes": need.pictures,
+            "memory": need,
             "available_bytes": available,
             "warnings": scene.warnings,
         });
@@ -68,11 +74,17 @@ pub fn run(args: Args) -> Result<ExitCode> {
     }
     let unit = scene.unit_in_mm.map_or("unit not declared".into(), |mm| format!("1 unit = {mm} mm"));
     println!("{}: {unit}, {width}x{height} pixels", scene.name);
+    let mega = |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6);
     println!(
-        "memory: film {:.1} MB, passes and pictures {:.1} MB, meshes {:.1} MB; available {}",
-        film_bytes as f64 / 1e6,
-        picture_bytes as f64 / 1e6,
-        scene.objects.iter().map(|o| o.mesh.bytes()).sum::<usize>() as f64 / 1e6,
+        "memory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, cache or photons {}; \
+         available {}",
+        mega(need.peak),
+        mega(need.film),
+        mega(need.pictures),
+        mega(need.meshes),
+        mega(need.trees),
+        mega(need.environment),
+        mega(need.pass),
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );
     let backend = if scene.why_double.is_some() { "rays in double precision" } else { prepared.backend.name() };
@@ -114,26 +126,22 @@ pub fn run(args: Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// How far models can be trusted on each translucent object; rays are built for nothing else.
-fn trust(prepared: &super::setup::Prepared, tolerance: f64) -> Result<Vec<Trustworthiness>> {
-    let scene = &prepared.scene;
+/// How far models can be trusted on each translucent object.
+fn trust(view: View<'_>, tolerance: f64) -> Vec<Trustworthiness> {
+    let scene = view.scene;
     let translucent = |object: &u32| matches!(scene.surface(*object), Surface::Translucent(_));
-    let objects: Vec<u32> = (0..scene.objects.len() as u32).filter(translucent).collect();
-    if objects.is_empty() {
-        return Ok(Vec::new());
-    }
-    let rays = query::build(prepared.backend, &scene.meshes())?;
-    let view = View { scene, rays: &*rays };
+    let objects = (0..scene.objects.len() as u32).filter(translucent);
     let of = |object: u32| Trustworthiness::new(view, &LocalShape::new(scene, object)?, tolerance);
-    Ok(objects.into_iter().filter_map(of).collect())
+    objects.filter_map(of).collect()
 }
 
-/// Samples of a pass, the picture, and what goes into an EXR file, beside the film.
-const BYTES_PER_PIXEL_OF_PICTURES: usize = 4 * size_of::<marmor::math::Rgb>();
-
-/// Writes mended meshes, in their own space: before the object's transform, after its `flip`.
+/// Writes mended meshes, in their own space: before the object's transform, after its `flip`. Nothing is written over what
+/// the scene is made of.
 fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> {
     let scene_folder = prepared.file.path.parent().unwrap_or(Path::new(""));
+    let mut files = Files::default();
+    files.reads_scene(&prepared.file);
+    let mut all = Vec::new();
     for entry in &prepared.file.objects {
         let Geometry::Mesh(path) = &entry.geometry else { continue };
         let mesh = load_obj(&scene_folder.join(path))?;
@@ -143,6 +151,13 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
         }
         let name: String = entry.name.chars().map(|c| if c.is_alphanumeric() { c } else { '_' }).collect();
         let target = folder.join(format!("{name}.obj"));
+        check_replaceable(&target)?;
+        let remedy = "give another folder to --write-mended, or other names to the objects";
+        files.writes(format!("the mended mesh of object {:?}", entry.name), &target, Remedy::Say(remedy));
+        all.push((entry, target, mesh, done));
+    }
+    files.check()?;
+    for (entry, target, mesh, done) in all {
         write_atomically(&target, |out| write_obj(&mesh, out))?;
         eprintln!(
             "wrote {}: {done}{}",
@@ -151,6 +166,14 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
         );
     }
     Ok(())
+}
+
+/// A share of the light.
+fn tolerance(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(e) if e > 0.0 && e <= 1.0 => Ok(e),
+        _ => Err("expected a share of the light above 0 and up to 1, such as 0.05".into()),
+    }
 }
 
 /// Area [unit²] and edges of the bounding box [unit].

@@ -2,7 +2,7 @@
 
 use super::converge::{file_name, scene_name};
 use super::keep::cancel_on_signals;
-use super::race::{RaceArgs, Reference, Runner, command, machine, race, remarks, same_size, stored};
+use super::race::{Failures, RaceArgs, Reference, Runner, command, machine, race, remarks, stored};
 use marmor::film::{Image, Metadata, PngOptions, Truth, Window, brightness, judge, png_bytes, save};
 use marmor::integrator::View;
 use marmor::math::Rgb;
@@ -37,16 +37,25 @@ pub fn run(args: Args) -> Result<ExitCode> {
 
 fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<ExitCode> {
     let entrants = args.entrants(models)?;
+    let mut names: Vec<String> =
+        ["compare.csv", "compare.json", "index.html", "reference.exr", "reference.png"].map(String::from).into();
+    for name in entrants.iter().map(|e| file_name(&e.name)) {
+        let ends = [".exr", ".png", "_difference.exr", "_relative.exr", "_relative.png"];
+        names.extend(ends.map(|end| format!("{name}{end}")));
+    }
+    args.check_files(&entrants, &names)?;
+    let given = args.reference.as_deref().map(stored).transpose()?;
+    args.check_sizes(&entrants, given.as_ref().map(|r| &r.truth.image))?;
     let mut runners = entrants.iter().map(Runner::new).collect::<Result<Vec<_>>>()?;
     let cancel = cancel_on_signals();
     let budget = args.budget();
-    same_size(&runners)?;
-    let reference = match &args.reference {
-        Some(path) => stored(path)?,
+    let reference = match given {
+        Some(reference) => reference,
         None => {
             let spec = truth.unwrap_or(MethodName::VolumePath.name());
             args.say(&format!("reference {spec}: {:.0} s", args.reference_budget()));
             let entrant = args.reference_entrant(spec, Some(spec), 0x7472_7574)?;
+            args.check_files(std::slice::from_ref(&entrant), &names)?;
             let mut runner = [Runner::new(&entrant)?];
             race(&mut runner, args.reference_budget(), &cancel, |_, r| r.follow())?;
             let [mut runner] = runner;
@@ -57,21 +66,29 @@ fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<Ex
     reference.truth.check(&runners[0].film)?;
     args.say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
     let whole = race(&mut runners, budget, &cancel, |_, runner| runner.follow())?;
+    args.leave_out_empty(&mut runners);
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
-    let report = write(args, &mut runners, &reference, exposure)?;
-    Ok(args.conclude(&report.remarks, &report.sentences(), whole))
+    let mut failed = Failures::default();
+    let report = write(args, &mut runners, &reference, exposure, &mut failed)?;
+    args.conclude((&report.remarks, &report.sentences()), &report.to_csv(), whole, failed)
 }
 
 /// Longest side of a picture on the page [pixels].
 const SHOWN: u32 = 320;
 
-fn write(args: &RaceArgs, runners: &mut [Runner<'_>], reference: &Reference, exposure: f64) -> Result<ModelComparison> {
+fn write(
+    args: &RaceArgs,
+    runners: &mut [Runner<'_>],
+    reference: &Reference,
+    exposure: f64,
+    failed: &mut Failures,
+) -> Result<ModelComparison> {
     let (folder, truth) = (&args.output, &reference.truth);
     let picture = |image: &Image, caption: &str, note: String, exposure: f64| -> Result<Picture> {
         let png = png_bytes(&image.shrunk(SHOWN), exposure)?;
         Ok(Picture { png, caption: caption.into(), note, pixelated: false })
     };
-    save_both(folder, "reference", &truth.image, exposure)?;
+    failed.note(save_both(folder, "reference", &truth.image, exposure));
     let mut pictures = vec![picture(&truth.image, &reference.text, "reference".into(), exposure)?];
     let shares = translucent_shares(&runners[0]);
     let (mut models, mut relatives) = (Vec::new(), Vec::new());
@@ -79,10 +96,10 @@ fn write(args: &RaceArgs, runners: &mut [Runner<'_>], reference: &Reference, exp
         let (image, name) = (runner.film.image(), &runner.entrant.name);
         let file = file_name(name);
         let [signed, relative] = differences(&image, &truth.image);
-        save_both(folder, &file, &image, exposure)?;
+        failed.note(save_both(folder, &file, &image, exposure));
         for (suffix, image) in [("difference", &signed), ("relative", &relative)] {
             let path = folder.join(format!("{file}_{suffix}.exr"));
-            save(image, &path, &Metadata::default(), PngOptions::default())?;
+            failed.note(save(image, &path, &Metadata::default(), PngOptions::default()));
         }
         let note = format!("{} samples, {:.1} s", runner.film.passes(), runner.seconds.total());
         pictures.push(picture(&image, name, note, exposure)?);
@@ -98,7 +115,8 @@ fn write(args: &RaceArgs, runners: &mut [Runner<'_>], reference: &Reference, exp
     let mut shown = Vec::new();
     for (name, file, relative) in &relatives {
         let colours = false_colours(relative, range);
-        save(&colours, &folder.join(format!("{file}_relative.png")), &Metadata::default(), PngOptions::default())?;
+        let path = folder.join(format!("{file}_relative.png"));
+        failed.note(save(&colours, &path, &Metadata::default(), PngOptions::default()));
         // Shrunk before it is coloured: colours do not average.
         shown.push(picture(&false_colours(&relative.shrunk(SHOWN), range), name, String::new(), 0.0)?);
     }
@@ -111,10 +129,10 @@ fn write(args: &RaceArgs, runners: &mut [Runner<'_>], reference: &Reference, exp
         remarks: remarks(runners, reference),
         footnotes: vec![format!("Machine: {}.", machine()), format!("Command: {}", command())],
     };
-    args.write("compare.csv", &report.to_csv())?;
+    args.write("compare.csv", &report.to_csv(), failed);
     let json = serde_json::to_string_pretty(&report).map_err(|e| Error::file(folder, "write compare.json", e))?;
-    args.write("compare.json", &json)?;
-    args.write("index.html", &report.page(&pictures, &shown).to_html())?;
+    args.write("compare.json", &json, failed);
+    args.write("index.html", &report.page(&pictures, &shown).to_html(), failed);
     Ok(report)
 }
 

@@ -2,7 +2,7 @@
 
 use super::keep::cancel_on_signals;
 use super::observers::{Records, error_figures};
-use super::race::{RaceArgs, Reference, Runner, command, machine, race, remarks, same_size, stored};
+use super::race::{Failures, RaceArgs, Reference, Runner, command, machine, race, remarks, stored};
 use marmor::Result;
 use marmor::film::{Image, Truth, Window, png_bytes};
 use marmor::report::{Convergence, ErrorCurve, Picture, Record, RecordFile};
@@ -32,19 +32,25 @@ pub fn run(args: Args) -> Result<ExitCode> {
 
 fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
     let entrants = args.entrants(methods)?;
+    let name = |i: usize| file_name(&entrants[i].name);
+    let records_of = |i: usize| format!("{}.jsonl", name(i));
+    let mut names: Vec<String> = FILES.map(String::from).into();
+    names.extend((0..entrants.len()).map(records_of));
+    names.extend(args.reference.is_none().then(|| "reference.exr".into()));
+    args.check_files(&entrants, &names)?;
+    let given = args.reference.as_deref().map(stored).transpose()?;
+    let resolution = args.check_sizes(&entrants, given.as_ref().map(|r| &r.truth.image))?;
     let mut runners = entrants.iter().map(Runner::new).collect::<Result<Vec<_>>>()?;
     let cancel = cancel_on_signals();
     let budget = args.budget();
-    let resolution = runners[0].film.resolution();
-    same_size(&runners)?;
-    let reference = reference(args, &cancel)?;
+    let mut failed = Failures::default();
+    let reference = reference(args, given, &cancel, &mut failed)?;
     let truth = &reference.truth;
     truth.check(&runners[0].film)?;
 
-    let name = |i: usize| file_name(&entrants[i].name);
     let mut records = Vec::new();
     for (i, runner) in runners.iter().enumerate() {
-        let file = RecordFile::create(&args.output.join(format!("{}.jsonl", name(i))))?;
+        let file = RecordFile::create(&args.output.join(records_of(i)))?;
         records.push((file, runner.seconds_setup));
     }
     let mut curves: Vec<ErrorCurve> = runners
@@ -61,11 +67,9 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
             curves[i].points.push(runner.measure(truth)?);
             let record = Records::record(runner.seconds_setup, runner.seconds, &runner.tally, &runner.film);
             let own = runner.own.last().as_ref().map(Into::into);
-            records[i].0.append(&Record {
-                error: Some(error_figures(&runner.film.image(), &truth.image)?),
-                own,
-                ..record
-            })?;
+            let error = Some(error_figures(&runner.film.image(), &truth.image)?);
+            // A full disk costs the record, not the report.
+            failed.note(records[i].0.append(&Record { error, own, ..record }));
         }
         let tenth = (10.0 * runner.seconds.total() / budget) as u32;
         if tenth > told && !args.quiet {
@@ -77,6 +81,8 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
     if !whole {
         args.say("interrupted; the report is of what there is");
     }
+    args.leave_out_empty(&mut runners);
+    curves.retain(|curve| !curve.points.is_empty());
     let report = Convergence {
         scene: scene_name(&args.scene),
         curves,
@@ -90,14 +96,21 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
         ],
     };
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
-    write_report(args, &report, &runners, &truth.image, exposure)?;
-    Ok(args.conclude(&report.remarks, &report.sentences(), whole))
+    write_report(args, &report, &runners, &truth.image, exposure, &mut failed)?;
+    args.conclude((&report.remarks, &report.sentences()), &report.to_csv(), whole, failed)
 }
 
+/// What a report has, beside records and reference.
+const FILES: [&str; 4] = ["converge.csv", "error_seconds.svg", "error_samples.svg", "index.html"];
+
 /// The reference as given, or rendered with the scene's own method, another seed and a longer time; with a line for people.
-fn reference(args: &RaceArgs, cancel: &AtomicBool) -> Result<Reference> {
-    if let Some(path) = &args.reference {
-        let mut reference = stored(path)?;
+fn reference(
+    args: &RaceArgs,
+    given: Option<Reference>,
+    cancel: &AtomicBool,
+    failed: &mut Failures,
+) -> Result<Reference> {
+    if let Some(mut reference) = given {
         reference.text = format!("{}; {}", reference.text, noise_text(&reference.truth));
         return Ok(reference);
     }
@@ -116,7 +129,7 @@ fn reference(args: &RaceArgs, cancel: &AtomicBool) -> Result<Reference> {
         noise_text(&truth)
     );
     let path = args.output.join("reference.exr");
-    marmor::film::save(&truth.image, &path, &Default::default(), Default::default())?;
+    failed.note(marmor::film::save(&truth.image, &path, &Default::default(), Default::default()));
     Ok(Reference { text, truth, remarks: runner.remarks() })
 }
 
@@ -135,10 +148,12 @@ fn write_report(
     runners: &[Runner<'_>],
     truth: &Image,
     exposure: f64,
+    failed: &mut Failures,
 ) -> Result<()> {
-    args.write("converge.csv", &report.to_csv())?;
-    for (figure, name) in report.figures().iter().zip(["error_seconds.svg", "error_samples.svg"]) {
-        args.write(name, &figure.to_svg())?;
+    let [csv, plots @ .., page] = FILES;
+    args.write(csv, &report.to_csv(), failed);
+    for (figure, name) in report.figures().iter().zip(plots) {
+        args.write(name, &figure.to_svg(), failed);
     }
     let images: Vec<Image> = runners.iter().map(|r| r.film.image()).collect();
     let part = telling_part(&images, truth);
@@ -156,7 +171,8 @@ fn write_report(
     if part == truth.window {
         thumbnails.clear();
     }
-    args.write("index.html", &report.page(&crops, &thumbnails).to_html())
+    args.write(page, &report.page(&crops, &thumbnails).to_html(), failed);
+    Ok(())
 }
 
 /// Longest side of a thumbnail [pixels].

@@ -1,11 +1,10 @@
 //! `marmor diff`.
 
-use super::read_picture;
+use super::{read_picture, stdout};
 use marmor::Result;
 use marmor::film::Image;
 use marmor::film::metrics::{self, Comparison, Errors, Estimate};
 use std::fmt::Write as _;
-use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -34,7 +33,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let mask = args.interior.as_deref().map(|path| read_mask(path, &a)).transpose()?;
     let comparison = metrics::compare(&a, &b, mask.as_deref())
         .map_err(|e| e.within(format!("{} against {}", args.a.display(), args.b.display())))?;
-    print(&if args.json { json(&args, &comparison) } else { table(&args, &comparison) });
+    stdout::write(format_args!("{}", if args.json { json(&args, &comparison) } else { table(&args, &comparison) }));
     Ok(ExitCode::SUCCESS)
 }
 
@@ -115,14 +114,5 @@ fn number(value: f64) -> String {
         format!("{value:.4}")
     } else {
         format!("{value:.4e}")
-    }
-}
-
-/// To standard output; a reader that has left (`| head`) is no fault of ours.
-fn print(text: &str) {
-    if let Err(error) = std::io::stdout().write_all(text.as_bytes())
-        && error.kind() != ErrorKind::BrokenPipe
-    {
-        eprintln!("marmor: cannot write to standard output: {error}");
     }
 }

@@ -1,9 +1,10 @@
 //! `marmor eval`.
 
+use super::stdout;
 use marmor::bssrdf::{KappaExtinction, ModelName, WidthFit};
 use marmor::report::{Batch, BatchOptions};
 use marmor::{Error, Result};
-use std::io::{self, BufRead, Write};
+use std::io::{self, BufRead, Read, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -52,6 +53,9 @@ pub struct Args {
     single: bool,
 }
 
+/// Longer than any row; what has no end is not read to it.
+const LONGEST: u64 = 1 << 20;
+
 /// Results are written when this many bytes are there.
 const BUFFER: usize = 1 << 18;
 
@@ -77,6 +81,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         clamped: args.clamped,
         single: args.single,
     };
+    refuse_own_output()?;
     let mut input = io::BufReader::with_capacity(BUFFER, io::stdin().lock());
     let mut output = io::stdout().lock();
     let mut out = String::with_capacity(BUFFER + 4096);
@@ -89,6 +94,19 @@ pub fn run(args: Args) -> Result<ExitCode> {
         Ok(()) | Err(Stop::ReaderGone) => Ok(ExitCode::SUCCESS),
         Err(Stop::Error(error)) => Err(error),
     }
+}
+
+/// Results that are appended to the very rows that are read would never end.
+fn refuse_own_output() -> Result<()> {
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt as _;
+        let end = |name: &str| std::fs::metadata(name).ok().filter(|m| m.is_file()).map(|m| (m.dev(), m.ino()));
+        if end("/dev/stdin").is_some_and(|input| end("/dev/stdout") == Some(input)) {
+            return Err(Error::usage("standard output is the file that the rows come from; write to another one"));
+        }
+    }
+    Ok(())
 }
 
 enum Stop {
@@ -108,18 +126,24 @@ fn evaluate(
     let mut flush = |out: &mut String| {
         flush(out).map_err(|cause| match cause.kind() {
             io::ErrorKind::BrokenPipe => Stop::ReaderGone,
-            _ => Stop::Error(Error::file(Path::new("standard output"), "write", cause)),
+            _ => Stop::Error(stdout::error_of(cause)),
         })
     };
-    let (mut batch, mut line, mut number) = (None, String::new(), 0_u64);
+    let (mut batch, mut bytes, mut number) = (None, Vec::new(), 0_u64);
     let (mut first_bad, mut bad) = (None, 0_u64);
     loop {
-        line.clear();
+        bytes.clear();
         number += 1;
-        let read = input.read_line(&mut line);
-        let read = read.map_err(|cause| {
+        let unread = |cause: io::Error| {
             Stop::Error(Error::file(Path::new("standard input"), &format!("read line {number}"), cause))
-        })?;
+        };
+        let read = input.by_ref().take(LONGEST).read_until(b'\n', &mut bytes).map_err(unread)?;
+        if read as u64 == LONGEST && !bytes.ends_with(b"\n") {
+            flush(out)?;
+            let what = format!("standard input, line {number}: longer than {LONGEST} bytes; is it a CSV?");
+            return Err(Stop::Error(Error::scene(what)));
+        }
+        let line = std::str::from_utf8(&bytes).map_err(|e| unread(io::Error::new(io::ErrorKind::InvalidData, e)))?;
         if read == 0 {
             flush(out)?;
             return first_bad.map_or(Ok(()), |error: Error| {

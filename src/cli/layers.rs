@@ -112,22 +112,45 @@ impl<'a> Layers<'a> {
         Ok(Self { names: once, scene, made: Mutex::new(Vec::new()) })
     }
 
-    /// All layers of `film`.
+    /// All layers of `film`, and a line for each that its passes are too few for.
     ///
     /// # Errors
-    /// Usage for a variance of fewer than two samples.
-    pub fn of(&self, film: &Film) -> Result<Vec<Layer>> {
-        self.names.iter().map(|&name| self.layer(name, film)).collect()
+    /// Those of making them, such as memory.
+    pub fn of(&self, film: &Film) -> Result<(Vec<Layer>, Vec<String>)> {
+        let (mut layers, mut said) = (Vec::new(), Vec::new());
+        for &name in &self.names {
+            match self.image(name, film)? {
+                Some(image) => {
+                    let (layer, channels) = name.channels();
+                    layers.push(Layer { name: layer.into(), channels, image });
+                }
+                None => said.push(format!(
+                    "warning: --layers {} is left out: it needs an even and an odd pass, there are {}",
+                    name.name(),
+                    film.ranges_text()
+                )),
+            }
+        }
+        Ok((layers, said))
     }
 
-    fn layer(&self, name: LayerName, film: &Film) -> Result<Layer> {
-        let image = match (name, name.seen(), &self.scene) {
-            (_, Some(what), Some((_, view))) => self.once(name, || first_hit(*view, film.window(), what)),
-            (LayerName::Single, _, Some((prepared, view))) => single(prepared, *view, film)?,
-            _ => variance(film).ok_or_else(|| Error::usage("--layers variance needs at least 2 samples per pixel"))?,
-        };
-        let (layer, channels) = name.channels();
-        Ok(Layer { name: layer.into(), channels, image })
+    /// Refuses layers that a film of the passes `range` can never have.
+    ///
+    /// # Errors
+    /// Usage.
+    pub fn check(&self, range: std::ops::Range<u32>) -> Result<()> {
+        if self.names.contains(&LayerName::Variance) && range.len() < 2 {
+            return Err(Error::usage("--layers variance needs at least 2 samples per pixel"));
+        }
+        Ok(())
+    }
+
+    fn image(&self, name: LayerName, film: &Film) -> Result<Option<Image>> {
+        match (name, name.seen(), &self.scene) {
+            (_, Some(what), Some((_, view))) => Ok(Some(self.once(name, || first_hit(*view, film.window(), what)))),
+            (LayerName::Single, _, Some((prepared, view))) => single(prepared, *view, film).map(Some),
+            _ => Ok(variance(film)),
+        }
     }
 
     /// The picture made before, or by `make`.

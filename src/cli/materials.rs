@@ -1,10 +1,10 @@
 //! `marmor materials`.
 
+use super::stdout;
 use marmor::Result;
 use marmor::optics::{CATALOGUE, ChannelOptics, Coefficients, Measured};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::io::Write;
 use std::process::ExitCode;
 
 /// Options.
@@ -31,8 +31,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         table(&rows)
     };
     text.push('\n');
-    // A reader that stops early is not an error.
-    let _ = std::io::stdout().lock().write_all(text.as_bytes());
+    stdout::write(format_args!("{text}"));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -9,12 +9,10 @@ macro_rules! eprintln {
         let _ = writeln!(std::io::stderr(), $($text)*);
     }};
 }
-/// The same for standard output.
+/// The same for standard output; a write that fails is told in the end.
 macro_rules! println {
-    ($($text:tt)*) => {{
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stdout(), $($text)*);
-    }};
+    () => { crate::cli::stdout::write(format_args!("\n")) };
+    ($($text:tt)*) => { crate::cli::stdout::write(format_args!("{}\n", format_args!($($text)*))) };
 }
 
 mod check;
@@ -22,10 +20,12 @@ mod compare;
 mod converge;
 mod diff;
 mod eval;
+mod files;
 mod keep;
 mod layers;
 mod materials;
 mod merge;
+mod need;
 mod observers;
 mod outputs;
 mod profile;
@@ -34,6 +34,8 @@ mod render;
 mod replay;
 mod setup;
 mod stats;
+mod stdout;
+mod threads;
 
 use clap::{Parser, Subcommand};
 use marmor::film::{FilePicture, Image};
@@ -82,18 +84,9 @@ fn read_picture(path: &Path, layer: Option<&str>) -> Result<Image> {
 
 /// Runs the command of this process's arguments.
 pub fn main() -> ExitCode {
-    let outcome: Result<ExitCode> = match Cli::parse().command {
-        Command::Render(args) => render::run(args),
-        Command::Merge(args) => merge::run(args),
-        Command::Check(args) => check::run(args),
-        Command::Diff(args) => diff::run(args),
-        Command::Compare(args) => compare::run(args),
-        Command::Converge(args) => converge::run(args),
-        Command::Profile(args) => profile::run(args),
-        Command::Eval(args) => eval::run(args),
-        Command::Materials(args) => materials::run(args),
-    };
-    outcome.unwrap_or_else(|error| {
+    let outcome = parse().and_then(|cli| cli.map_or(Ok(ExitCode::SUCCESS), run));
+    // Last: what was said so far may not have come through.
+    outcome.and_then(|code| stdout::finish().map(|()| code)).unwrap_or_else(|error| {
         eprintln!("marmor: {error}");
         ExitCode::from(match error.kind() {
             ErrorKind::Usage => 2,
@@ -103,4 +96,32 @@ pub fn main() -> ExitCode {
             ErrorKind::Memory => 6,
         })
     })
+}
+
+/// The command asked for; none where help was.
+fn parse() -> Result<Option<Cli>> {
+    match Cli::try_parse() {
+        Ok(cli) => Ok(Some(cli)),
+        Err(wrong) if wrong.use_stderr() => wrong.exit(),
+        Err(help) => {
+            let text = help.render();
+            let styled = std::io::IsTerminal::is_terminal(&std::io::stdout());
+            stdout::write(format_args!("{}", if styled { text.ansi().to_string() } else { text.to_string() }));
+            Ok(None)
+        }
+    }
+}
+
+fn run(cli: Cli) -> Result<ExitCode> {
+    match cli.command {
+        Command::Render(args) => render::run(args),
+        Command::Converge(args) => converge::run(args),
+        Command::Compare(args) => compare::run(args),
+        Command::Merge(args) => threads::with(None, || merge::run(args)),
+        Command::Check(args) => threads::with(None, || check::run(args)),
+        Command::Diff(args) => threads::with(None, || diff::run(args)),
+        Command::Profile(args) => threads::with(None, || profile::run(args)),
+        Command::Eval(args) => threads::with(None, || eval::run(args)),
+        Command::Materials(args) => materials::run(args),
+    }
 }

@@ -1,15 +1,16 @@
 //! What is told while a render runs: a bar or plain lines, and records.
 
 use indicatif::{ProgressBar, ProgressStyle};
-use marmor::Result;
 use marmor::film::metrics::{self, Estimate};
-use marmor::film::{Film, Image};
+use marmor::film::{Film, Image, Window};
 use marmor::film::{SelfError, SelfErrors, WorstPixel};
 use marmor::integrator::Tally;
 use marmor::render::{Observer, Progress, Seconds};
 use marmor::report::{ErrorFigures, Record, RecordFile};
+use marmor::{Error, Result};
 use std::cell::Cell;
 use std::io::IsTerminal;
+use std::path::Path;
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -171,20 +172,26 @@ impl ProgressDisplay {
         }
     }
 
-    /// The share of the job that is done, by whichever limit comes first.
-    fn fraction_done(&mut self, progress: &Progress<'_>) -> f64 {
-        let by_passes = progress.job.passes.map_or(0.0, |n| f64::from(progress.film.passes()) / f64::from(n));
-        let by_time = progress.job.time.map_or(0.0, |t| progress.seconds.total() / t.as_secs_f64());
-        let own = self.own.get().and_then(|own| own.relmse_careful);
+    /// The share of the job that is done and the seconds left, by whichever limit comes first.
+    fn done(&mut self, progress: &Progress<'_>) -> (f64, Option<f64>) {
         let passes = progress.film.passes();
-        let by_error = self.target.zip(own).map_or(0.0, |(target, own)| self.trend.share(passes, own, target));
-        by_passes.max(by_time).max(by_error).min(1.0)
+        let all = progress.seconds.total();
+        let by_passes = progress.job.passes.map(|n| f64::from(passes) / f64::from(n));
+        let own = self.own.get().and_then(|own| own.relmse_careful);
+        let by_error = self.target.zip(own).map(|(target, own)| self.trend.share(passes, own, target));
+        let whole = [by_passes, by_error].into_iter().flatten().map(|share| (share, all * (1.0 / share - 1.0)));
+        // `--time` is this run's alone.
+        let run = all - progress.earlier;
+        let by_time = progress.job.time.map(|t| t.as_secs_f64()).map(|limit| (run / limit, limit - run));
+        let limits = whole.chain(by_time).filter(|(share, _)| *share > 0.0);
+        let first = limits.min_by(|a, b| a.1.total_cmp(&b.1));
+        first.map_or((0.0, None), |(share, left)| (share.min(1.0), Some(left.max(0.0))))
     }
 }
 
 impl Observer for ProgressDisplay {
     fn after_pass(&mut self, progress: &Progress<'_>) -> Result<()> {
-        let done = self.fraction_done(progress);
+        let (done, left) = self.done(progress);
         let passes = progress.film.passes();
         let elapsed = progress.seconds.total();
         let error = self.own.relmse().map_or(String::new(), |e| {
@@ -193,8 +200,7 @@ impl Observer for ProgressDisplay {
             format!(", relMSE {:.1e} ×/÷ {factor}{wanted}", e.value)
         });
         // Before anything is known of an error to reach there is no time left to tell.
-        let left =
-            if done > 0.0 { format!("about {} left", clock(elapsed * (1.0 / done - 1.0))) } else { "? left".into() };
+        let left = left.map_or("? left".into(), |left| format!("about {} left", clock(left)));
         let line = format!("pass {passes}, {} elapsed, {left}{error}", clock(elapsed));
         match &mut self.shown {
             Shown::Silent => {}
@@ -224,16 +230,18 @@ fn clock(seconds: f64) -> String {
     }
 }
 
-/// Writes one record a pass.
+/// Writes one record a pass. A record that cannot be written costs neither the picture nor the records after it.
 pub struct Records {
     /// The file.
     pub file: RecordFile,
-    /// Reading the scene and building everything [s].
+    /// Reading the scene and building everything, in all runs [s].
     pub seconds_setup: f64,
     /// What to measure against.
     pub reference: Option<Image>,
     /// What the render tells of itself.
     pub own: OwnError,
+    /// The first failure, and the number of lines that are missing.
+    pub failed: Option<(Error, u32)>,
 }
 
 impl Records {
@@ -269,8 +277,35 @@ impl Observer for Records {
         };
         let own = self.own.get().as_ref().map(Into::into);
         let record = Self::record(self.seconds_setup, progress.seconds, progress.tally, progress.film);
-        self.file.append(&Record { error, own, ..record })
+        if let Err(error) = self.file.append(&Record { error, own, ..record }) {
+            if self.failed.is_none() {
+                eprintln!("warning: {error}; the render goes on");
+            }
+            self.failed.get_or_insert((error, 0)).1 += 1;
+        }
+        Ok(())
     }
+}
+
+impl Records {
+    /// What was not written.
+    pub fn failure(self) -> Option<Error> {
+        self.failed.map(|(error, lines)| error.within(format_args!("{lines} lines of the records are missing")))
+    }
+}
+
+/// Refuses a reference that a picture of `resolution` and `window` cannot be compared with.
+pub fn check_reference(path: &Path, image: &Image, resolution: [u32; 2], window: Window) -> Result<()> {
+    if (image.resolution, image.window) == (resolution, window) {
+        return Ok(());
+    }
+    let size = |[w, h]: [u32; 2], window: Window| format!("{w}x{h} with pixels {window}");
+    Err(Error::usage(format!(
+        "--reference {}: it is {}, the picture will be {} (x0,y0,x1,y1); give one of the same size",
+        path.display(),
+        size(image.resolution, image.window),
+        size(resolution, window)
+    )))
 }
 
 /// The figures of a record.

@@ -39,6 +39,7 @@ impl<'a> Outputs<'a> {
             ("method", prepared.method.name().into()),
             ("backend", backend.into()),
             ("seed", prepared.seed.to_string()),
+            ("build", build()),
         ]
         .map(|(key, value)| (key.to_string(), value))
         .into();
@@ -46,7 +47,7 @@ impl<'a> Outputs<'a> {
         Self { paths, identity: identity(prepared, backend, window), attributes, exposure, layers }
     }
 
-    /// Writes every file, also those after one that fails. What a PNG could not hold is in the lines returned.
+    /// Writes every file, also those after one that fails. What a PNG or a layer could not hold is in the lines returned.
     ///
     /// # Errors
     /// The first failure.
@@ -57,11 +58,15 @@ impl<'a> Outputs<'a> {
             created: source_date_epoch(),
             attributes: self.all_attributes(film, spent),
         };
-        let (image, layers) = (film.image(), self.layers.of(film)?);
-        let (mut said, mut failed) = (Vec::new(), None);
+        let image = film.image();
+        // A layer that cannot be made does not take the picture with it.
+        let ((layers, mut said), mut failed) = match self.layers.of(film) {
+            Ok(layers) => (layers, None),
+            Err(error) => (Default::default(), Some(error)),
+        };
         for path in &self.paths {
             let saved = match Format::of(path)? {
-                Format::Film => self.save_film(path, film, spent).map(|()| None),
+                Format::Film => self.save_film(path, film, spent, false).map(|()| None),
                 _ => save_with_layers(&image, &layers, path, &metadata, PngOptions { exposure: self.exposure })
                     .map(|report| report.png),
             };
@@ -82,9 +87,9 @@ impl<'a> Outputs<'a> {
         failed.map_or(Ok(said), Err)
     }
 
-    /// Writes the film itself.
-    pub fn save_film(&self, path: &Path, film: &Film, spent: &Spent) -> Result<()> {
-        let progress = json!({ "spent": spent, "exposure": self.exposure });
+    /// Writes the film itself; a `checkpoint` is one that nobody asked for and that may be taken away.
+    pub fn save_film(&self, path: &Path, film: &Film, spent: &Spent, checkpoint: bool) -> Result<()> {
+        let progress = json!({ "spent": spent, "exposure": self.exposure, "checkpoint": checkpoint });
         Checkpoint::write(path, film, &self.identity, &self.attributes, progress)
     }
 
@@ -108,18 +113,30 @@ pub fn progress(of: &Checkpoint) -> (Spent, f64) {
     (spent, exposure.unwrap_or(0.0))
 }
 
+/// Whether a film file was written on the way, under a name that nobody gave.
+pub fn is_checkpoint(film: &Checkpoint) -> bool {
+    film.progress.get("checkpoint").and_then(serde_json::Value::as_bool) == Some(true)
+}
+
+/// Version and build of this program: other sources, dependencies or compilers may give other bits.
+fn build() -> String {
+    format!("{} ({})", env!("CARGO_PKG_VERSION"), env!("MARMOR_BUILD"))
+}
+
 /// Everything that decides a bit of the sums.
 fn identity(prepared: &Prepared, backend: &str, window: Window) -> Identity {
     let scene = &prepared.scene;
     let [width, height] = scene.camera.resolution;
     let mut facts = vec![
-        ("version", env!("CARGO_PKG_VERSION").to_string()),
+        ("build", build()),
         ("method", prepared.method.name().into()),
         ("backend", backend.into()),
         ("seed", prepared.seed.to_string()),
-        ("picture", format!("{width}x{height} pixels, of these {window}")),
         ("the lecture's form", prepared.as_notes.to_string()),
+        ("meshes mended", prepared.repair.to_string()),
         ("scene", prepared.file.decisive()),
+        // After the scene, which has a line to name.
+        ("picture", format!("{width}x{height} pixels, of these {window}")),
     ]
     .into_iter()
     .map(|(name, value)| (name.to_string(), value))
@@ -129,6 +146,11 @@ fn identity(prepared: &Prepared, backend: &str, window: Window) -> Identity {
         let hash = o.mesh.fingerprint();
         (format!("mesh of {}", o.name), format!("{vertices} vertices, {triangles} triangles, hash {hash:016x}"))
     }));
+    if let (Some(image), Some(name)) = (&scene.environment.image, &prepared.file.environment.image) {
+        let [width, height] = image.resolution;
+        let what = format!("{}, {width}x{height} pixels, hash {:016x}", name.display(), image.fingerprint());
+        facts.push(("picture of the environment".into(), what));
+    }
     facts.push(("centre of the scene".into(), scene.centre.to_string()));
     Identity(facts)
 }

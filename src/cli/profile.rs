@@ -1,12 +1,13 @@
 //! `marmor profile`.
 
+use super::stdout;
 use clap::builder::NonEmptyStringValueParser;
 use marmor::bssrdf::{Bssrdf, DirectionalDipole, Model, ModelName, ModelVisitor};
+use marmor::film::{check_replaceable, write_atomically};
 use marmor::math::Rgb;
 use marmor::optics::{self, Measured, Medium};
 use marmor::report::Profile;
 use marmor::{Error, Result};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -55,6 +56,10 @@ struct Radii(Vec<f64>);
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
+    if let Some(path) = &args.output {
+        is_svg(path)?;
+        check_replaceable(path)?;
+    }
     let row = args.material.as_deref().map(optics::find_or_explain).transpose();
     let row = row.map_err(|e| Error::usage(format!("--material: {e}")))?;
     let medium = medium(&args, row)?;
@@ -70,15 +75,12 @@ pub fn run(args: Args) -> Result<ExitCode> {
         }
     }
     match args.output.as_deref() {
-        None => {
-            // A reader that stops early is not an error.
-            let _ = std::io::stdout().lock().write_all(profile.to_csv().as_bytes());
-            Ok(())
+        None => stdout::write(format_args!("{}", profile.to_csv())),
+        Some(path) => {
+            let content = if is_svg(path)? { profile.to_svg() } else { profile.to_csv() };
+            write_atomically(path, |out| out.write_all(content.as_bytes()))?;
         }
-        Some(path) if has_extension(path, "svg") => write(path, &profile.to_svg()),
-        Some(path) if has_extension(path, "csv") => write(path, &profile.to_csv()),
-        Some(path) => Err(Error::usage(format!("{}: a profile is written as .svg or .csv", path.display()))),
-    }?;
+    }
     Ok(ExitCode::SUCCESS)
 }
 
@@ -109,18 +111,13 @@ impl ModelVisitor for Add<'_> {
     }
 }
 
-fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case(extension))
-}
-
-/// Beside the target first, then renamed, so that no reader sees half a file.
-fn write(path: &Path, content: &str) -> Result<()> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let part = PathBuf::from(part);
-    std::fs::write(&part, content)
-        .and_then(|()| std::fs::rename(&part, path))
-        .map_err(|cause| Error::file(path, "write", cause))
+/// Whether a plot is asked for, or else a table.
+fn is_svg(path: &Path) -> Result<bool> {
+    let is = |ending: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending));
+    if is("svg") || is("csv") {
+        return Ok(is("svg"));
+    }
+    Err(Error::usage(format!("{}: a profile is written as .svg or .csv", path.display())))
 }
 
 fn triple(text: &str) -> std::result::Result<[f64; 3], String> {

@@ -1,8 +1,13 @@
 //! Several ways to render one scene, pass by pass in turns on equal time: shared by `converge` and `compare`.
 
+use super::files::{Files, Remedy};
+use super::observers::check_reference;
 use super::render::duration;
 use super::setup::{MethodArgs, Prepared, prepare};
-use marmor::film::{Checkpoint, Film, Format, SelfError, Truth, Window, judge, write_atomically};
+use super::{stdout, threads};
+use marmor::film::{
+    Checkpoint, Film, Format, Image, SelfError, Truth, Window, check_replaceable, judge, write_atomically,
+};
 use marmor::integrator::{Tally, View};
 use marmor::query::{self, RayQuery};
 use marmor::render::{Job, Seconds};
@@ -44,11 +49,45 @@ impl RaceArgs {
     /// Makes the folder and runs `job` on the threads asked for.
     pub fn run<T: Send>(&self, job: impl FnOnce() -> Result<T> + Send) -> Result<T> {
         std::fs::create_dir_all(&self.output).map_err(|e| Error::file(&self.output, "make the folder", e))?;
-        let mut builder = rayon::ThreadPoolBuilder::new();
-        if let Some(threads) = self.threads {
-            builder = builder.num_threads(threads.max(1));
+        threads::with(self.threads, job)
+    }
+
+    /// Whether the files `names` can be written in the folder, and are neither each other nor what is read.
+    pub fn check_files(&self, entrants: &[Entrant], names: &[String]) -> Result<()> {
+        let mut files = Files::default();
+        entrants.iter().for_each(|e| files.reads_scene(&e.prepared.file));
+        self.reference.iter().for_each(|path| files.reads("the reference", path));
+        for name in names {
+            let path = self.output.join(name);
+            check_replaceable(&path)?;
+            files.writes("a file of the report", &path, Remedy::Say("name another folder by -o, and each method once"));
         }
-        builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?.install(job)
+        files.check()
+    }
+
+    /// Takes out those that an interruption left without a pass: a black picture is no result.
+    pub fn leave_out_empty(&self, runners: &mut Vec<Runner<'_>>) {
+        runners.retain(|runner| {
+            let empty = runner.film.passes() == 0;
+            if empty {
+                self.say(&format!("`{}` has no pass yet and is left out", runner.entrant.name));
+            }
+            !empty
+        });
+    }
+
+    /// The size of all pictures, of which there must be one; `reference` has to have it too.
+    pub fn check_sizes(&self, entrants: &[Entrant], reference: Option<&Image>) -> Result<[u32; 2]> {
+        let resolution = |e: &Entrant| e.prepared.scene.camera.resolution;
+        let one = entrants.first().map_or([0, 0], resolution);
+        if let Some(other) = entrants.iter().find(|e| resolution(e) != one) {
+            let name = &other.name;
+            return Err(Error::usage(format!("`{name}` has another resolution; pictures of one size are compared")));
+        }
+        if let Some((path, image)) = self.reference.as_ref().zip(reference) {
+            check_reference(path, image, one, Window::full(one))?;
+        }
+        Ok(one)
     }
 
     /// A line on standard error, unless `--quiet`.
@@ -79,17 +118,49 @@ impl RaceArgs {
         Entrant::new(name, &self.scene, &method.seeded(self.method.seed().unwrap_or(0) ^ salt))
     }
 
-    /// A file of the report, under its name in the folder.
-    pub fn write(&self, name: &str, text: &str) -> Result<()> {
-        write_atomically(&self.output.join(name), |out| out.write_all(text.as_bytes()))
+    /// A file of the report, under its name in the folder. A failure does not take the other files with it.
+    pub fn write(&self, name: &str, text: &str, failed: &mut Failures) {
+        failed.note(write_atomically(&self.output.join(name), |out| out.write_all(text.as_bytes())));
     }
 
-    /// Says remarks, sentences and where the page is; `whole` is false after an interruption.
-    pub fn conclude(&self, remarks: &[String], sentences: &[String], whole: bool) -> ExitCode {
+    /// Says remarks, sentences and where the page is; `whole` is false after an interruption. Where files could not be written
+    /// the table goes to standard output.
+    ///
+    /// # Errors
+    /// The first failure, unless there was an interruption.
+    pub fn conclude(
+        &self,
+        (remarks, sentences): (&[String], &[String]),
+        table: &str,
+        whole: bool,
+        failed: Failures,
+    ) -> Result<ExitCode> {
         remarks.iter().for_each(|remark| self.say(&format!("warning: {remark}")));
         sentences.iter().for_each(|sentence| self.say(sentence));
-        self.say(&format!("wrote {}", self.output.join("index.html").display()));
-        if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) }
+        match failed.0 {
+            None => self.say(&format!("wrote {}", self.output.join("index.html").display())),
+            Some(error) => {
+                stdout::write(format_args!("{table}"));
+                if whole {
+                    return Err(error);
+                }
+                eprintln!("marmor: {error}");
+            }
+        }
+        Ok(if whole { ExitCode::SUCCESS } else { ExitCode::from(super::INTERRUPTED) })
+    }
+}
+
+/// The first of several files that could not be written.
+#[derive(Default)]
+pub struct Failures(Option<Error>);
+
+impl Failures {
+    /// Takes note of one outcome.
+    pub fn note<T>(&mut self, outcome: Result<T>) {
+        if let Err(error) = outcome {
+            self.0.get_or_insert(error);
+        }
     }
 }
 
@@ -228,18 +299,6 @@ pub fn remarks(runners: &[Runner<'_>], reference: &Reference) -> Vec<String> {
         }
     }
     out
-}
-
-/// Refuses renders of different sizes.
-pub fn same_size(runners: &[Runner<'_>]) -> Result<()> {
-    let resolution = runners[0].film.resolution();
-    match runners.iter().find(|r| r.film.resolution() != resolution) {
-        Some(other) => {
-            let name = &other.entrant.name;
-            Err(Error::usage(format!("`{name}` has another resolution; pictures of one size are compared")))
-        }
-        None => Ok(()),
-    }
 }
 
 /// A reference that was rendered before: an EXR does not tell its noise, a film does.

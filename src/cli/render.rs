@@ -1,19 +1,20 @@
 //! `marmor render`: from a scene file to pictures. Reads in the order it runs.
 
 use super::INTERRUPTED;
-use super::keep::{KeepArgs, Keeper, cancel_on_signals};
+use super::files::{Files, Remedy};
+use super::keep::{FilmFile, KeepArgs, Keeper, cancel_on_signals};
 use super::layers::{LayerName, Layers};
-use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, error_figures};
+use super::observers::{Measure, OwnError, ProgressDisplay, Records, Verbosity, check_reference, error_figures};
 use super::outputs::Outputs;
 use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
-use super::{read_picture, replay};
-use marmor::film::{Film, Format, Image, Window, check_writable};
+use super::{read_picture, replay, threads};
+use marmor::film::{Film, Format, Image, Window, check_replaceable, check_writable};
 use marmor::integrator::{Integrator, Part, View};
 use marmor::query;
 use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
 use marmor::report::RecordFile;
-use marmor::scene::Scene;
+use marmor::scene::{Scene, SceneFile};
 use marmor::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -21,9 +22,6 @@ use std::time::{Duration, Instant};
 
 /// Samples per pixel where neither scene nor options say.
 const DEFAULT_SPP: u32 = 64;
-
-/// More threads than any machine has processors.
-const MOST_THREADS: usize = 4096;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -40,7 +38,7 @@ pub struct Args {
     /// Samples per pixel [default: the scene's, else 64]
     #[arg(long, value_name = "N")]
     spp: Option<u32>,
-    /// Stop after this time of rendering, such as 30s, 5m or 500ms
+    /// Stop after this time of rendering in this run, such as 30s, 5m or 500ms; what --resume goes on from is not in it
     #[arg(long, value_name = "TIME", value_parser = duration)]
     time: Option<Duration>,
     /// Stop when the estimated relMSE is down to this, such as 1e-3
@@ -56,7 +54,7 @@ pub struct Args {
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     layers: Vec<LayerName>,
     /// Brighten or darken the PNG by this many stops [default: the scene's, else 0]
-    #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true, value_parser = stops)]
     exposure: Option<f64>,
     /// Measure the error against this EXR after each pass
     #[arg(long, value_name = "EXR")]
@@ -94,30 +92,33 @@ pub fn run(args: Args) -> Result<ExitCode> {
         _ => Verbosity::Normal,
     };
     let outputs = if args.output.is_empty() { default_outputs(&args) } else { args.output.clone() };
+    let film_file = args.keep.film_file(&outputs);
     if args.pixel.is_none() {
-        outputs.iter().try_for_each(|path| check_writable(path))?;
-        args.keep.check(&outputs)?;
+        check_files(&args, &outputs, &film_file)?;
     }
-    let is_film = |path: &PathBuf| Format::of(path).is_ok_and(|format| format == Format::Film);
-    if args.keep.samples_range.is_some() && args.pixel.is_none() && !outputs.iter().any(is_film) {
-        eprintln!("warning: `marmor merge` needs film files: add -o NAME.film");
-    }
-    let reference = args.reference.as_deref().map(|path| read_picture(path, None)).transpose()?;
-    let mut builder = rayon::ThreadPoolBuilder::new();
-    if let Some(threads) = args.threads {
-        if threads > MOST_THREADS {
-            return Err(Error::usage(format!("--threads {threads}: at most {MOST_THREADS}")));
-        }
-        builder = builder.num_threads(threads.max(1));
-    }
-    let pool = builder.build().map_err(|e| Error::usage(format!("cannot start threads: {e}")))?;
+    let reference = args.reference.as_deref().map(|path| Ok((path, read_picture(path, None)?))).transpose()?;
 
-    pool.install(|| {
+    threads::with(args.threads, || {
         let file = args.method.read(&args.scene)?;
         let resolution = file.camera.resolution;
         let window = args.crop.unwrap_or(Window::full(resolution));
+        if args.pixel.is_none() {
+            collisions(&args, &outputs, &film_file, &file)?;
+        }
         // Before meshes are read, which may take long.
-        Film::require_memory(window)?;
+        Film::check(resolution, window)?;
+        if let Some((path, image)) = &reference {
+            check_reference(path, image, resolution, window)?;
+        }
+        let reference = reference.map(|(_, image)| image);
+        let passes = match &args.keep.samples_range {
+            Some(range) => Some(range.end),
+            None => Some(args.spp.or(file.render.spp).unwrap_or(DEFAULT_SPP))
+                .filter(|_| args.spp.is_some() || args.time.is_none() && args.target_error.is_none()),
+        };
+        if passes == Some(0) {
+            return Err(Error::usage("0 samples per pixel make no picture; ask for at least 1 with --spp"));
+        }
         let prepared = prepare(file, &args.method)?;
         let scene = &prepared.scene;
         for warning in &scene.warnings {
@@ -129,25 +130,19 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let rays = query::build(prepared.backend, &meshes)?;
         let view = View { scene, rays: &*rays };
         let cancel = cancel_on_signals();
-        let job = Job {
-            seed: prepared.seed,
-            passes: match &args.keep.samples_range {
-                Some(range) => Some(range.end),
-                None => Some(args.spp.or(prepared.file.render.spp).unwrap_or(DEFAULT_SPP))
-                    .filter(|_| args.spp.is_some() || args.time.is_none() && args.target_error.is_none()),
-            },
-            time: args.time,
-            cancel: &cancel,
-        };
+        let job = Job { seed: prepared.seed, passes, time: args.time, cancel: &cancel };
         if let Some(pixel) = args.pixel {
             return replay::run(&prepared, view, &job, pixel, args.pass);
         }
         let exposure = args.exposure.or(prepared.file.render.exposure).unwrap_or(0.0);
         let layers = Layers::new(&args.layers, Some((&prepared, view)))?;
+        layers.check(args.keep.samples_range.clone().unwrap_or(0..passes.unwrap_or(u32::MAX)))?;
         let outputs = Outputs::new(&prepared, &rays.description(), window, outputs, exposure, layers);
-        let (mut film, spent, mut keeper) = args.keep.start(&outputs, resolution, window, job.passes)?;
+        let (mut film, spent, mut keeper) = args.keep.start(&outputs, &film_file, &prepared.file, window, passes)?;
+        let earlier = spent.seconds.total();
         if film.passes() > 0 && verbosity > Verbosity::Quiet {
-            eprintln!("going on from {} after {} passes", keeper.path.display(), film.passes());
+            let path = film_file.path.display();
+            eprintln!("going on from {path} after {} passes and {earlier:.1} s of rendering", film.passes());
         }
         let mut task = Task {
             args: &args,
@@ -157,6 +152,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
             description: rays.description(),
             effective: prepared.file.effective(),
             own: OwnError::default(),
+            earlier,
+            failed: None,
         };
         if verbosity > Verbosity::Quiet {
             let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles.len()).sum();
@@ -177,28 +174,66 @@ pub fn run(args: Args) -> Result<ExitCode> {
             Method::Subsurface(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
             Method::VolumePath(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
         };
-        if film.passes() == 0 {
-            return Err(Error::usage("0 samples per pixel make no picture; ask for at least 1 with --spp"));
-        }
-        let spent = Spent { seconds: finished.seconds, tally: finished.tally };
-        let saved = outputs.save(&film, &spent);
-        // Where a picture fails the film file may still come through.
-        let said = saved.map_err(|e| keeper.rescue(e, &film, &spent))?;
-        if verbosity > Verbosity::Quiet {
-            said.iter().for_each(|line| eprintln!("{line}"));
+        let spent = Spent { setup: keeper.setup, seconds: finished.seconds, tally: finished.tally };
+        match outputs.save(&film, &spent) {
+            Ok(said) if verbosity > Verbosity::Quiet => said.iter().for_each(|line| eprintln!("{line}")),
+            Ok(_) => {}
+            // Where a picture fails the film file may still come through.
+            Err(error) => return Err(keeper.rescue(error, &film, &spent)),
         }
         let kept = keeper.finish(finished.stop, &film, &spent)?;
         let odd = odd(&film, &spent).map(|cause| (cause, replay_line(&args, &film, prepared.seed)));
         task.tell(scene, &finished, &film, &outputs.paths, kept, odd.as_ref())?;
+        let failed = task.failed.take();
+        if finished.stop == Stop::Cancelled {
+            failed.iter().for_each(|error| eprintln!("marmor: {error}"));
+            return Ok(ExitCode::from(INTERRUPTED));
+        }
         if let Some((cause, replay)) = odd.filter(|_| args.strict) {
+            failed.iter().for_each(|error| eprintln!("marmor: {error}"));
             return Err(Error::new(ErrorKind::Numeric, format!("--strict: {cause}; to look at one: {replay}")));
         }
         if args.strict && spent.tally.walk.lost_many() {
+            failed.iter().for_each(|error| eprintln!("marmor: {error}"));
             let lost = spent.tally.walk.lost(scene).join("; ");
             return Err(Error::new(ErrorKind::Numeric, format!("--strict: {lost}")));
         }
-        Ok(if finished.stop == Stop::Cancelled { ExitCode::from(INTERRUPTED) } else { ExitCode::SUCCESS })
+        // The pictures are there, and something else that was asked for is not.
+        failed.map_or(Ok(ExitCode::SUCCESS), Err)
     })
+}
+
+/// Whether everything can be written, and what is there already may be.
+fn check_files(args: &Args, outputs: &[PathBuf], film_file: &FilmFile) -> Result<()> {
+    outputs.iter().try_for_each(|path| check_writable(path))?;
+    args.stats.iter().try_for_each(|path| check_replaceable(path))?;
+    args.keep.check(film_file)?;
+    let is = |path: &PathBuf, kind| Format::of(path).is_ok_and(|format| format == kind);
+    if args.keep.samples_range.is_some() && !outputs.iter().any(|path| is(path, Format::Film)) {
+        eprintln!("warning: `marmor merge` needs film files: add -o NAME.film");
+    }
+    if !args.layers.is_empty() && !outputs.iter().any(|path| is(path, Format::Exr)) {
+        return Err(Error::usage("--layers: only an EXR holds layers; add -o NAME.exr"));
+    }
+    Ok(())
+}
+
+/// Refuses outputs that are inputs, or each other; and records over a file of something else.
+fn collisions(args: &Args, outputs: &[PathBuf], film_file: &FilmFile, file: &SceneFile) -> Result<()> {
+    let mut files = Files::default();
+    files.reads_scene(file);
+    args.reference.iter().for_each(|path| files.reads("the reference", path));
+    for path in outputs {
+        let what = if Format::of(path)? == Format::Film { "the film file" } else { "the picture" };
+        files.writes(what, path, Remedy::Name("-o"));
+    }
+    args.records.iter().for_each(|path| files.writes("the file of --records", path, Remedy::Name("--records")));
+    args.stats.iter().for_each(|path| files.writes("the file of --stats", path, Remedy::Name("--stats")));
+    if !outputs.contains(&film_file.path) {
+        files.writes("the film file of an interrupted render", &film_file.path, Remedy::Name("-o"));
+    }
+    files.check()?;
+    args.records.iter().try_for_each(|path| RecordFile::check(path))
 }
 
 /// One render and what is said about it.
@@ -210,6 +245,10 @@ struct Task<'a> {
     description: String,
     effective: String,
     own: OwnError,
+    /// Time of rendering in earlier runs [s].
+    earlier: f64,
+    /// What could not be written beside the pictures.
+    failed: Option<Error>,
 }
 
 impl Task<'_> {
@@ -229,14 +268,16 @@ impl Task<'_> {
                 eprintln!("  {} {}: {}", if part.built { "built   " } else { "left out" }, part.name, part.why);
             }
         }
-        let seconds_setup = self.begin.elapsed().as_secs_f64();
+        let seconds_setup = spent.setup + self.begin.elapsed().as_secs_f64();
+        keeper.setup = seconds_setup;
         let (target, each_pass) = (self.args.target_error, self.args.records.is_some());
         let mut measure = Measure::new(self.own.clone(), each_pass, target);
         let mut display = ProgressDisplay::new(self.verbosity, self.own.clone(), target);
         let mut records = match &self.args.records {
             Some(path) => {
                 let file = RecordFile::go_on(path, film.passes())?;
-                Some(Records { file, seconds_setup, reference: self.reference.clone(), own: self.own.clone() })
+                let (reference, own) = (self.reference.clone(), self.own.clone());
+                Some(Records { file, seconds_setup, reference, own, failed: None })
             }
             None => None,
         };
@@ -247,6 +288,7 @@ impl Task<'_> {
         observers.push(keeper);
         let outcome = render::resume(method, view, job, film, spent, &mut observers)?;
         display.finish();
+        self.failed = records.and_then(Records::failure);
         if let Some(path) = &self.args.stats {
             let stats = Stats {
                 effective: &self.effective,
@@ -257,7 +299,9 @@ impl Task<'_> {
                 outcome: &outcome,
                 film,
             };
-            stats::write(path, &stats)?;
+            if let Err(error) = stats::write(path, &stats) {
+                self.failed.get_or_insert(error);
+            }
         }
         Ok(outcome)
     }
@@ -269,7 +313,7 @@ impl Task<'_> {
         outcome: &Outcome,
         film: &Film,
         outputs: &[PathBuf],
-        kept: Option<&Path>,
+        kept: Option<&FilmFile>,
         odd: Option<&(String, String)>,
     ) -> Result<()> {
         if self.verbosity == Verbosity::Quiet {
@@ -277,11 +321,16 @@ impl Task<'_> {
         }
         let seconds = outcome.seconds;
         eprintln!(
-            "{} passes in {:.1} s (cache {:.1} s, gather {:.1} s), {:.1} s in all{}",
+            "{} passes in {:.1} s (cache {:.1} s, gather {:.1} s){}, {:.1} s in all{}",
             film.passes(),
             seconds.total(),
             seconds.cache,
             seconds.gather,
+            if self.earlier > 0.0 {
+                format!(", {:.1} s of them in this run", seconds.total() - self.earlier)
+            } else {
+                String::new()
+            },
             self.begin.elapsed().as_secs_f64(),
             match outcome.stop {
                 Stop::Passes => "",
@@ -314,9 +363,16 @@ impl Task<'_> {
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();
         eprintln!("wrote {}", names.join(", "));
         if let Some(kept) = kept {
-            eprintln!("wrote {}: the same call with --resume goes on from it", kept.display());
+            let path = kept.path.display();
+            match &kept.passed_by {
+                None => eprintln!("wrote {path}: the same call with --resume goes on from it"),
+                Some(_) => {
+                    let names = names.join(" -o ");
+                    eprintln!("wrote {path}: the same call with -o {names} -o {path} --resume goes on from it");
+                }
+            }
         }
-        let spent = Spent { seconds: outcome.seconds, tally: outcome.tally };
+        let spent = Spent { setup: 0.0, seconds: outcome.seconds, tally: outcome.tally };
         eprintln!("{}", odd_line(film, &spent, odd.map(|(_, replay)| replay.as_str())));
         Ok(())
     }
@@ -383,6 +439,14 @@ pub(super) fn duration(text: &str) -> std::result::Result<Duration, String> {
     match number.trim().parse::<f64>() {
         Ok(n) if n > 0.0 && n * factor < 1e9 => Ok(Duration::from_secs_f64(n * factor)),
         _ => Err("expected a time above 0 such as 30s, 5m or 500ms".into()),
+    }
+}
+
+/// Stops that a picture can be brightened or darkened by.
+pub(super) fn stops(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(n) if n.abs() <= 64.0 => Ok(n),
+        _ => Err("expected stops from -64 to 64".into()),
     }
 }
 

@@ -79,6 +79,26 @@ impl Method {
         }
     }
 
+    /// Memory of what a pass shares [bytes].
+    pub fn pass_bytes(&self, view: View<'_>) -> u64 {
+        use marmor::integrator::Integrator as _;
+        match self {
+            Self::AmbientOcclusion(m) => m.pass_bytes(view),
+            Self::Direct(m) => m.pass_bytes(view),
+            Self::Subsurface(m) => m.pass_bytes(view),
+            Self::VolumePath(m) => m.pass_bytes(view),
+        }
+    }
+
+    /// Tables over the triangles of translucent objects [bytes/triangle].
+    pub fn bytes_per_triangle(&self) -> u64 {
+        match self {
+            Self::AmbientOcclusion(_) | Self::Direct(_) => 0,
+            Self::Subsurface(_) => 40,
+            Self::VolumePath(_) => 90,
+        }
+    }
+
     /// What was built and what was left out.
     pub fn parts(&self, scene: &Scene) -> Vec<Part> {
         use marmor::integrator::Integrator as _;
@@ -101,6 +121,8 @@ pub struct Prepared {
     pub backend: Backend,
     pub seed: u64,
     pub as_notes: bool,
+    /// Whether meshes were mended.
+    pub repair: bool,
     estimator: Estimator,
 }
 
@@ -160,7 +182,7 @@ pub fn prepare(file: SceneFile, args: &MethodArgs) -> Result<Prepared> {
     let estimator = if args.as_notes { default } else { file.method.estimator.unwrap_or(default) };
     let method = build(&scene, &file.method, args.as_notes, estimator, seed)?;
     let backend = args.backend.unwrap_or(Backend::preferred());
-    Ok(Prepared { method, backend, seed, as_notes: args.as_notes, estimator, scene, file })
+    Ok(Prepared { method, backend, seed, as_notes: args.as_notes, repair: args.repair, estimator, scene, file })
 }
 
 impl MethodArgs {

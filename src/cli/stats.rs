@@ -39,6 +39,7 @@ pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
         })).collect::<Vec<_>>(),
         "parts": parts,
         "passes": film.passes(),
+        "peak_bytes": marmor::memory::peak(),
         "seconds": { "setup": seconds_setup, "cache": seconds.cache, "gather": seconds.gather },
         "clock": tally.clock,
         "rays": tally.rays,

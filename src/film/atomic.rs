@@ -25,8 +25,11 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     Ok(())
 }
 
-/// Whether [`write_atomically`] could write `path` now; leaves nothing behind. Same errors.
-pub(super) fn check(path: &Path) -> Result<()> {
+/// Whether [`write_atomically`] could write `path` now; leaves nothing behind.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn check_replaceable(path: &Path) -> Result<()> {
     let target = resolve(path)?;
     sweep(&target);
     Temporary::beside(&target, path).map(drop)

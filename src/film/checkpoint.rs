@@ -4,8 +4,9 @@
 use super::sums::Sums;
 use super::{Counts, Film, Window, atomic};
 use crate::math::hash_combine;
-use crate::{Error, Result};
+use crate::{Error, Result, memory};
 use serde::{Deserialize, Serialize};
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::ops::Range;
@@ -13,8 +14,8 @@ use std::path::Path;
 
 /// What every film file begins with; the number is the version of the layout.
 const MAGIC: &[u8] = b"marmor film 1\n";
-/// A header is JSON text of at most this many bytes: far more than any scene.
-const MOST_HEADER: u64 = 1 << 24;
+/// Memory for each byte of the header while it is read.
+const BYTES_PER_BYTE: u128 = 4;
 /// Runs of passes in one file: far more than anybody merges.
 const MOST_RANGES: usize = 1 << 16;
 
@@ -36,38 +37,41 @@ impl Identity {
         sum.value()
     }
 
+    /// The value of the fact `name`.
+    pub fn get(&self, name: &str) -> Option<&str> {
+        self.0.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
+    }
+
+    /// The name of the first fact that differs. `None` where all agree.
+    pub fn differs<'a>(&'a self, other: &'a Self) -> Option<&'a str> {
+        fn map(of: &Identity) -> HashMap<&str, &str> {
+            of.0.iter().map(|(name, value)| (name.as_str(), value.as_str())).collect()
+        }
+        let (ours, theirs) = (map(self), map(other));
+        let mut names = self.0.iter().chain(&other.0).map(|(name, _)| name.as_str());
+        names.find(|name| ours.get(name) != theirs.get(name))
+    }
+
     /// The first fact that differs, with both values; of long texts the first line that differs. `None` where all agree.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let value = |of: &Self, name: &str| of.0.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone());
-        let mut names: Vec<&String> = self.0.iter().chain(&other.0).map(|(n, _)| n).collect();
-        let mut seen = std::collections::HashSet::new();
-        names.retain(|n| seen.insert(*n));
-        names.into_iter().find_map(|name| {
-            let pair = (value(self, name), value(other, name));
-            if pair.0 == pair.1 {
-                return None;
-            }
-            Some(match pair {
-                (Some(a), Some(b)) => {
-                    let (mut left, mut right) = (a.lines(), b.lines());
-                    let (mut line, mut differing) = (0, (None, None));
-                    while differing.0 == differing.1 {
-                        (differing, line) = ((left.next(), right.next()), line + 1);
-                        if differing == (None, None) {
-                            break;
-                        }
+        let name = self.differs(other)?;
+        Some(match (self.get(name), other.get(name)) {
+            (Some(a), Some(b)) => {
+                let (mut left, mut right) = (a.lines(), b.lines());
+                let (mut line, mut differing) = (0, (None, None));
+                while differing.0 == differing.1 {
+                    (differing, line) = ((left.next(), right.next()), line + 1);
+                    if differing == (None, None) {
+                        break;
                     }
-                    let shown = |text: Option<&str>| text.map_or("nothing".into(), |t| format!("`{}`", cut(t)));
-                    let at = if a.lines().count().max(b.lines().count()) > 1 {
-                        format!(", line {line}")
-                    } else {
-                        String::new()
-                    };
-                    format!("{name}{at}: {} there, {} here", shown(differing.0), shown(differing.1))
                 }
-                (Some(_), None) => format!("{name}: there, but not here"),
-                _ => format!("{name}: here, but not there"),
-            })
+                let shown = |text: Option<&str>| text.map_or("nothing".into(), |t| format!("`{}`", cut(t)));
+                let lines = a.lines().count().max(b.lines().count());
+                let at = if lines > 1 { format!(", line {line}") } else { String::new() };
+                format!("{name}{at}: {} there, {} here", shown(differing.0), shown(differing.1))
+            }
+            (Some(_), None) => format!("{name}: there, but not here"),
+            _ => format!("{name}: here, but not there"),
         })
     }
 }
@@ -172,9 +176,11 @@ impl Checkpoint {
         let mut length = [0; 8];
         from.read_exact(&mut length).map_err(damaged)?;
         let length = u64::from_le_bytes(length);
-        if length > MOST_HEADER.min(metadata.len()) {
+        if length > metadata.len() {
             return Err(no("the film file is cut short or damaged: its header is longer than the file"));
         }
+        let what = format!("{}: its header", path.display());
+        memory::require(u128::from(length) * BYTES_PER_BYTE, memory::available(), &what, "use a smaller scene")?;
         let mut header = vec![0; length as usize];
         from.read_exact(&mut header).map_err(damaged)?;
         let header: Header =

@@ -6,7 +6,7 @@ use super::exr_layers::{Choice, choose};
 use super::primaries::Primaries;
 use super::{Attribute, FilePicture, Image, Window};
 use crate::math::Rgb;
-use crate::{Error, ErrorKind, Result, memory};
+use crate::{Error, ErrorKind, Result, input, memory};
 use ::exr::image::FlatSamples;
 use exr::prelude as exr;
 use exr::{ReadChannels, ReadLayers};
@@ -122,10 +122,7 @@ pub fn read_attributes(path: &Path) -> Result<BTreeMap<String, Attribute>> {
 }
 
 fn open(path: &Path) -> Result<File> {
-    match std::fs::metadata(path) {
-        Ok(found) if found.is_dir() => Err(Error::file(path, "read", "it is a folder")),
-        _ => File::open(path).map_err(|e| Error::file(path, "read", e)),
-    }
+    input::open(path).map(|(file, _)| file)
 }
 
 /// The first bytes of a file, as many as tell its kind.

@@ -4,8 +4,7 @@
 use super::primaries::{Conversion, Primaries, XYZ};
 use super::{FilePicture, Image, Window};
 use crate::math::Rgb;
-use crate::{Error, Result, memory};
-use std::fs::File;
+use crate::{Error, Result, input, memory};
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -22,7 +21,7 @@ pub(super) fn read(path: &Path, layer: Option<&str>) -> Result<FilePicture> {
     if let Some(layer) = layer {
         return Err(failed(format!("it is a Radiance HDR file, which has no layers, nor `{layer}`")));
     }
-    let mut reader = BufReader::new(File::open(path).map_err(|e| Error::file(path, "read", e))?);
+    let mut reader = BufReader::new(input::open(path)?.0);
     let header = Header::read(&mut reader).map_err(failed)?;
     let area = u128::from(header.lines) * u128::from(header.length);
     let what = format!("{}: reading it", path.display());

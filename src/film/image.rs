@@ -2,7 +2,7 @@
 
 use super::{Window, exr_read, hdr_read};
 use crate::Result;
-use crate::math::Rgb;
+use crate::math::{Rgb, hash_combine};
 use std::path::Path;
 
 /// Linear radiance for each pixel of a window of the whole picture.
@@ -71,6 +71,14 @@ impl Image {
             })
             .collect();
         Self { resolution, window, pixels }
+    }
+
+    /// A hash of every bit of the picture.
+    pub fn fingerprint(&self) -> u64 {
+        let w = self.window;
+        let sizes = [self.resolution[0], self.resolution[1], w.x0, w.y0, w.x1, w.y1];
+        let state = sizes.iter().fold(0, |state, &n| hash_combine(state, n.into()));
+        self.pixels.iter().flat_map(|p| p.0).fold(state, |state, value| hash_combine(state, value.to_bits().into()))
     }
 
     /// The value at column x, row y of the whole picture; none outside the window.

@@ -22,7 +22,7 @@ mod sums;
 mod variance;
 mod window;
 
-pub use atomic::write_atomically;
+pub use atomic::{check_replaceable, write_atomically};
 pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;

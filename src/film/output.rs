@@ -129,5 +129,5 @@ pub fn png_bytes(image: &Image, exposure: f64) -> Result<Vec<u8>> {
 /// As [`save`].
 pub fn check_writable(path: &Path) -> Result<()> {
     Format::of(path)?;
-    atomic::check(path)
+    atomic::check_replaceable(path)
 }

@@ -207,13 +207,7 @@ impl Film {
     /// Usage if the window is empty or leaves the picture; Memory if the sums are more than what is available,
     /// known before anything is allocated where the system tells (Linux: [`memory::available`]).
     pub fn new(resolution: [u32; 2], window: Window) -> Result<Self> {
-        let [width, height] = resolution;
-        if window.is_empty() || !Window::full(resolution).contains(window) {
-            return Err(Error::usage(format!(
-                "the window {window} (x0,y0,x1,y1; x1 and y1 excluded) is empty or leaves the picture of {width}x{height} pixels"
-            )));
-        }
-        Self::require_memory(window)?;
+        Self::check(resolution, window)?;
         let mut sums = Vec::new();
         sums.try_reserve_exact(window.area()).map_err(|_| {
             let needed = memory::gigabytes(window.area() as u128 * Self::BYTES_PER_PIXEL as u128);
@@ -227,11 +221,17 @@ impl Film {
 
     const REMEDY: &str = "render a smaller picture, or parts of it by --crop";
 
-    /// Whether a film of `window` would fit into memory, before anything else is done for it.
+    /// Whether [`Film::new`] would make such a film, before anything else is done for it.
     ///
     /// # Errors
-    /// Memory if not, with both numbers.
-    pub fn require_memory(window: Window) -> Result<()> {
+    /// As [`Film::new`].
+    pub fn check(resolution: [u32; 2], window: Window) -> Result<()> {
+        let [width, height] = resolution;
+        if window.is_empty() || !Window::full(resolution).contains(window) {
+            return Err(Error::usage(format!(
+                "the window {window} (x0,y0,x1,y1; x1 and y1 excluded) is empty or leaves the picture of {width}x{height} pixels"
+            )));
+        }
         let what = format!("the film of {}x{} pixels", window.width(), window.height());
         let needed = window.area() as u128 * Self::BYTES_PER_PIXEL as u128;
         memory::require(needed, memory::available(), &what, Self::REMEDY)

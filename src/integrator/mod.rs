@@ -187,6 +187,11 @@ pub trait Integrator: Sync {
         false
     }
 
+    /// Memory of what a pass shares, at its most while it is made [bytes]; may trace some rays to know.
+    fn pass_bytes(&self, _view: View<'_>) -> u64 {
+        0
+    }
+
     /// What was built for this scene, and what was left out.
     fn parts(&self, scene: &Scene) -> Vec<Part>;
 }

@@ -22,6 +22,9 @@ use std::sync::OnceLock;
 /// A cached sample, its columns twice while the tree is built, and its share of the tree.
 const BYTES_PER_SAMPLE: u128 = 256;
 
+/// What a sample was measured to take of that, with 2 million of them.
+const TAKEN_PER_SAMPLE: u64 = 180;
+
 /// Options of [`Subsurface`].
 #[derive(Clone, Copy, Debug)]
 pub struct SubsurfaceOptions {
@@ -368,6 +371,11 @@ impl Integrator for Subsurface {
 
     fn shares_tiles(&self) -> bool {
         matches!(self.options.estimator, Estimator::All | Estimator::Cut | Estimator::Cluster)
+    }
+
+    fn pass_bytes(&self, _view: View<'_>) -> u64 {
+        let samples: u64 = self.bodies.iter().flatten().map(|body| u64::from(body.samples)).sum();
+        samples * TAKEN_PER_SAMPLE
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {

@@ -22,7 +22,7 @@ pub struct Job<'a> {
     pub seed: u64,
     /// Stop before the pass of this number, counted from 0; a pass is one sample of each pixel.
     pub passes: Option<u32>,
-    /// Stop after the pass that reaches this time of rendering.
+    /// Stop after the pass that reaches this time of rendering, not counting what an earlier run took.
     pub time: Option<Duration>,
     /// Set from outside to stop: the running pass is dropped, unless it is the first.
     pub cancel: &'a AtomicBool,
@@ -51,6 +51,8 @@ pub struct Progress<'a> {
     pub film: &'a Film,
     /// Time of all passes so far.
     pub seconds: Seconds,
+    /// What of it earlier runs took [s].
+    pub earlier: f64,
     /// Work of all passes so far.
     pub tally: &'a Tally,
     /// The job, for what is still to come.
@@ -88,6 +90,8 @@ pub enum Stop {
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Spent {
+    /// Reading scenes and building trees and tables, once for each run [s].
+    pub setup: f64,
     /// Time of all passes.
     pub seconds: Seconds,
     /// Work of all passes.
@@ -97,6 +101,7 @@ pub struct Spent {
 impl Spent {
     /// Adds what another part of the render took.
     pub fn add(&mut self, other: &Self) {
+        self.setup += other.setup;
         self.seconds.cache += other.seconds.cache;
         self.seconds.gather += other.seconds.gather;
         self.tally += other.tally;
@@ -143,18 +148,19 @@ pub fn resume<I: Integrator>(
 ) -> Result<Outcome> {
     let tiles = tiles(film.window());
     let mut outcome = Outcome { stop: Stop::Passes, seconds: spent.seconds, tally: spent.tally };
+    let earlier = spent.seconds.total();
     loop {
         outcome.stop = match job.passes {
             Some(passes) if film.next_pass() >= passes => Stop::Passes,
             _ if film.passes() >= Film::MOST_PASSES => Stop::Passes,
-            _ if job.time.is_some_and(|limit| outcome.seconds.total() >= limit.as_secs_f64()) => Stop::Time,
+            _ if job.time.is_some_and(|limit| outcome.seconds.total() - earlier >= limit.as_secs_f64()) => Stop::Time,
             _ if observers.iter().any(|o| o.satisfied()) => Stop::Satisfied,
             _ if job.cancel.load(Ordering::Relaxed) && film.passes() > 0 => Stop::Cancelled,
             _ => {
                 if !render_pass(integrator, view, job, film, &tiles, &mut outcome) {
                     continue;
                 }
-                let progress = Progress { film, seconds: outcome.seconds, tally: &outcome.tally, job };
+                let progress = Progress { film, seconds: outcome.seconds, earlier, tally: &outcome.tally, job };
                 for observer in observers.iter_mut() {
                     observer.after_pass(&progress)?;
                 }

@@ -2,12 +2,13 @@
 
 use crate::cache::{Clock, GatherTally};
 use crate::error::{Error, Result};
-use crate::film::{Counts, SelfErrors};
+use crate::film::{Counts, SelfErrors, check_replaceable, write_atomically};
+use crate::input;
 use crate::integrator::WalkTally;
 use crate::query::RayTally;
 use serde::Serialize;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// The state of a render after a pass; keys are stable, later versions only add some. All counts and times are
@@ -90,20 +91,47 @@ impl Record {
     }
 }
 
-/// A file of records, flushed after each line so that an interrupted render keeps them all.
+/// A file of records. Each line is appended by itself and stands in the file as a whole or not at all: what a full disk
+/// cuts short is taken away again.
 pub struct RecordFile {
     path: PathBuf,
-    out: BufWriter<File>,
+    file: File,
+    /// Length up to the end of the last whole line [bytes].
+    whole: u64,
 }
 
+/// How every line of a file of records begins.
+const BEGIN: &[u8] = b"{\"pass\":";
+/// Longer than any line of ours.
+const LONGEST: u64 = 1 << 16;
+
 impl RecordFile {
-    /// Starts a new file at `path`, over whatever is there.
+    /// Whether records can be written to `path`: a new file, or one of records. Leaves it as it is.
+    ///
+    /// # Errors
+    /// A file error with the path: a folder that is not there, a pipe, a file of something else.
+    pub fn check(path: &Path) -> Result<()> {
+        check_replaceable(path)?;
+        if !path.exists() {
+            return Ok(());
+        }
+        let mut start = Vec::new();
+        let (file, _) = input::open(path)?;
+        file.take(BEGIN.len() as u64).read_to_end(&mut start).map_err(|e| Error::file(path, "read", e))?;
+        if !BEGIN.starts_with(&start) {
+            return Err(Error::file(path, "write records", "there is a file of something else; give another name"));
+        }
+        Ok(())
+    }
+
+    /// Starts a new file at `path`, over older records.
     ///
     /// # Errors
     /// A file error with the path.
     pub fn create(path: &Path) -> Result<Self> {
+        Self::check(path)?;
         let file = File::create(path).map_err(|e| Error::file(path, "write records", e))?;
-        Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
+        Ok(Self { path: path.to_owned(), file, whole: 0 })
     }
 
     /// Goes on with the file at `path` for a render whose next pass is number `next`: lines of later passes, which are
@@ -116,26 +144,42 @@ impl RecordFile {
         if next == 0 || !path.exists() {
             return Self::create(path);
         }
-        let old = std::fs::read(path).map_err(|e| Error::file(path, "read records", e))?;
-        let kept = old.split_inclusive(|&b| b == b'\n').filter(|line| {
-            let record: Option<serde_json::Value> = serde_json::from_slice(line).ok();
-            let pass = record.and_then(|r| r.get("pass")?.as_u64());
-            pass.is_some_and(|pass| pass <= next.into()) && line.ends_with(b"\n")
-        });
-        let kept: Vec<u8> = kept.flatten().copied().collect();
-        crate::film::write_atomically(path, |out| out.write_all(&kept))?;
-        let file = File::options().append(true).open(path).map_err(|e| Error::file(path, "write records", e))?;
-        Ok(Self { path: path.to_owned(), out: BufWriter::new(file) })
+        Self::check(path)?;
+        let mut old = BufReader::new(input::open(path)?.0);
+        let mut line = Vec::new();
+        write_atomically(path, |out| {
+            loop {
+                line.clear();
+                if old.by_ref().take(LONGEST).read_until(b'\n', &mut line)? == 0 {
+                    return Ok(());
+                }
+                let record: Option<serde_json::Value> = serde_json::from_slice(&line).ok();
+                let pass = record.and_then(|r| r.get("pass")?.as_u64());
+                if line.ends_with(b"\n") && pass.is_some_and(|pass| pass <= next.into()) {
+                    out.write_all(&line)?;
+                }
+            }
+        })?;
+        let failed = |e| Error::file(path, "write records", e);
+        let mut file = File::options().write(true).open(path).map_err(failed)?;
+        let whole = file.seek(SeekFrom::End(0)).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), file, whole })
     }
 
     /// Appends a line.
     ///
     /// # Errors
-    /// A file error with the path.
+    /// A file error with the path; the line is not in the file then, and the next one may be.
     pub fn append(&mut self, record: &Record) -> Result<()> {
-        let line = serde_json::to_string(record).map_err(|e| Error::file(&self.path, "write records", e))?;
-        writeln!(self.out, "{line}")
-            .and_then(|()| self.out.flush())
-            .map_err(|e| Error::file(&self.path, "write records", e))
+        let failed = |e: io::Error| Error::file(&self.path, "write records", e);
+        let mut line = serde_json::to_vec(record).map_err(|e| failed(e.into()))?;
+        line.push(b'\n');
+        if let Err(error) = self.file.write_all(&line) {
+            // Nothing can be done about a file that cannot even be cut back.
+            let _ = self.file.set_len(self.whole).and_then(|()| self.file.seek(SeekFrom::Start(self.whole)));
+            return Err(failed(error));
+        }
+        self.whole += line.len() as u64;
+        Ok(())
     }
 }

@@ -160,7 +160,7 @@ mod tests {
     fn object(mesh: &crate::geometry::ObjMesh) -> Object {
         let mesh = mesh.recentred(DVec3::ZERO);
         let findings = examine(&mesh);
-        Object { name: String::new(), mesh, material: 0, findings }
+        Object { name: String::new(), mesh, at: String::new(), material: 0, findings }
     }
 
     /// Six rectangles, their corners at the same places.

@@ -1,13 +1,16 @@
 //! What can be typed: one struct a section, every number checked alone. What needs meshes is checked in `load.rs`.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::environment::{self, EnvironmentEntry};
 use super::materials::{self, MaterialEntry};
 use super::objects::{self, ObjectEntry};
 use super::options::{MethodOptions, RenderOptions, named};
-use super::tree::{Fields, Node};
+use super::tree::{Fields, Node, Value};
+use super::{Geometry, difference};
 use crate::error::{Error, Result, did_you_mean};
+use crate::input;
 use crate::math::{DVec3, Rgb};
 
 /// A scene file whose numbers are in range and whose names exist. docs/scene-format.md lists every key.
@@ -64,6 +67,9 @@ named! {
 const UNITS: &[(&str, f64)] =
     &[("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3), ("km", 1e6), ("in", 25.4), ("ft", 304.8)];
 
+/// Memory for each byte of a scene file while it is parsed; measured with 100 000 objects.
+const BYTES_PER_BYTE: u128 = 100;
+
 const SECTIONS: &[&str] = &["unit", "camera", "object", "material", "environment", "method", "render"];
 
 impl SceneFile {
@@ -72,8 +78,7 @@ impl SceneFile {
     /// # Errors
     /// A file error if it cannot be read; else a scene error that names the line, the key, what is expected.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read(path).map_err(|e| Error::file(path, "read", e))?;
-        let text = String::from_utf8(text).map_err(|e| {
+        let text = String::from_utf8(input::read_all(path, BYTES_PER_BYTE)?).map_err(|e| {
             let line = 1 + e.as_bytes()[..e.utf8_error().valid_up_to()].iter().filter(|&&b| b == b'\n').count();
             Error::scene(format!("{}:{line}: not UTF-8 text; a scene file is TOML", path.display()))
         })?;
@@ -108,18 +113,44 @@ impl SceneFile {
 
     /// [`Self::effective`] without what decides no bit of a sample: how many there are, and how they are shown.
     pub fn decisive(&self) -> String {
-        let mut all = self.root.to_toml();
-        if let Some(render) = all.get_mut("render").and_then(toml::Value::as_table_mut) {
-            for key in ["spp", "exposure"] {
-                render.remove(key);
+        toml::to_string(&self.decisive_root().to_toml()).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
+    }
+
+    /// The first value that is not that of `other`, a scene as [`Self::decisive`] writes it: where it was typed, both
+    /// values. `None` where `other` is no scene or the same one.
+    pub fn difference(&self, other: &str) -> Option<String> {
+        let there = Node::parse(other, &self.path).ok()?;
+        let here = self.decisive_root();
+        let found = difference::first(&here, &there)?;
+        Some(format!("{}: {}", found.place.within(&self.path), found.values("here", "in the film")))
+    }
+
+    fn decisive_root(&self) -> Node {
+        let mut root = self.root.clone();
+        if let Value::Table(sections) = &mut root.value {
+            for (_, section) in sections.iter_mut().filter(|(name, _)| name == "render") {
+                if let Value::Table(keys) = &mut section.value {
+                    keys.retain(|(key, _)| key != "spp" && key != "exposure");
+                }
             }
-            if render.is_empty()
-                && let Some(table) = all.as_table_mut()
-            {
-                table.remove("render");
-            }
+            sections.retain(|(name, section)| {
+                name != "render" || !matches!(&section.value, Value::Table(keys) if keys.is_empty())
+            });
         }
-        toml::to_string(&all).unwrap_or_else(|e| format!("# not writable as TOML: {e}"))
+        root
+    }
+
+    /// Every file that the scene names, with what it is: meshes once each, the picture of the environment.
+    pub fn inputs(&self) -> Vec<(String, PathBuf)> {
+        let folder = self.path.parent().unwrap_or(Path::new(""));
+        let mut seen = HashSet::new();
+        let meshes = self.objects.iter().filter_map(|object| match &object.geometry {
+            Geometry::Mesh(path) => Some((format!("the mesh of object {:?}", object.name), path)),
+            _ => None,
+        });
+        let sky = self.environment.image.iter().map(|path| ("the picture of [environment]".to_string(), path));
+        let all = meshes.chain(sky).map(|(what, path)| (what, folder.join(path)));
+        all.filter(|(_, path)| seen.insert(path.clone())).collect()
     }
 
     fn from_tree(root: Node, path: &Path) -> Result<Self> {
@@ -175,9 +206,13 @@ pub(super) fn named_value<T: std::str::FromStr<Err = Error>>(fields: &Fields<'_>
     name.parse().map(Some).map_err(|e: Error| fields.error_at(key, format_args!("is wrong: {e}")))
 }
 
-/// `name` among `known`, or the complaint with the nearest one.
+/// `name` among `known`, or the complaint with the nearest one; long lists are cut short.
 pub(super) fn unknown(name: &str, known: &[&str]) -> String {
-    format!("{name:?} does not exist{}; there are {}", did_you_mean(name, known.iter().copied()), known.join(", "))
+    const MOST: usize = 60;
+    let more = known.len().saturating_sub(MOST);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let listed = known[..known.len().min(MOST)].join(", ");
+    format!("{name:?} does not exist{}; there are {listed}{more}", did_you_mean(name, known.iter().copied()))
 }
 
 fn camera(top: &Fields<'_>) -> Result<CameraEntry> {

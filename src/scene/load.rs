@@ -105,14 +105,19 @@ impl Scene {
 fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
     let mut read: HashMap<PathBuf, Rc<ObjMesh>> = HashMap::new();
     let mut out = Vec::with_capacity(file.objects.len());
+    let mut unasked = 0;
     for entry in &file.objects {
         let mesh = match &entry.geometry {
             Geometry::Rectangle { centre, edge_u, edge_v } => rectangle(*centre, *edge_u, *edge_v),
             Geometry::Sphere { centre, radius, rings, segments } => {
                 let triangles = 2 * u128::from(rings - 1) * u128::from(*segments);
                 let what = format!("{}: object {:?} of {triangles} triangles", entry.at, entry.name);
-                let needed = triangles * LOADING_BYTES as u128;
-                memory::require(needed, memory::available(), &what, "use fewer rings and segments")?;
+                // Asking the system takes longer than making a small sphere.
+                unasked += triangles * LOADING_BYTES as u128;
+                if unasked > 1 << 26 {
+                    memory::require(unasked, memory::available(), &what, "use fewer rings and segments")?;
+                    unasked = 0;
+                }
                 sphere(*centre, *radius, *rings, *segments)
             }
             Geometry::Mesh(path) => {

@@ -1,9 +1,10 @@
 //! The file as typed, and the checked world made from it: camera, materials, meshes, units.
 //! Not for: rays, light transport. Read first: `file.rs`, `objects.rs`, `materials.rs`, `options.rs` (what can be typed;
-//! `tree.rs` remembers the lines), `world.rs` (what the renderer sees),
+//! `tree.rs` remembers the lines, `difference.rs` names them), `world.rs` (what the renderer sees),
 //! `load.rs` (the way from one to the other).
 
 mod camera;
+mod difference;
 mod doctor;
 mod energy;
 mod environment;
@@ -19,6 +20,7 @@ mod warnings;
 mod world;
 
 pub use camera::Camera;
+pub use difference::difference;
 pub use doctor::Remark;
 pub use environment::{Environment, EnvironmentEntry};
 pub use file::{CameraEntry, FovAxis, SceneFile};

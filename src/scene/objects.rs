@@ -1,6 +1,7 @@
 //! `[[object]]` as typed.
 
 use glam::DMat3;
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use super::file::{named_value, switch, unknown, vector};
@@ -85,14 +86,16 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
         return Err(top.missing("object", "at least one [[object]]"));
     }
     let mut out: Vec<ObjectEntry> = Vec::with_capacity(list.len());
+    let numbers: HashMap<&str, usize> = materials.iter().zip(0..).map(|(m, i)| (m.name.as_str(), i)).collect();
+    let mut taken: HashMap<String, String> = HashMap::with_capacity(list.len());
     for (i, o) in list.iter().enumerate() {
         let geometry = geometry(o)?;
         let name = o.get("name", "a name in quotes", Node::text)?.map_or_else(|| format!("object {i}"), String::from);
-        if let Some(other) = out.iter().find(|other| other.name == name) {
-            return Err(o.error_at("name", format_args!("{name:?} is taken ({}); give each object its own", other.at)));
+        if let Some(other) = taken.insert(name.clone(), o.at()) {
+            return Err(o.error_at("name", format_args!("{name:?} is taken ({other}); give each object its own")));
         }
         let asked = o.need("material", "the name of a [material.NAME]", Node::text)?;
-        let material = materials.iter().position(|m| m.name == asked).ok_or_else(|| {
+        let material = numbers.get(asked).copied().ok_or_else(|| {
             let known: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
             let what = if known.is_empty() {
                 format!("{asked:?} does not exist; add a section [material.{asked}]")

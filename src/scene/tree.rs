@@ -122,10 +122,36 @@ impl Node {
         if let Value::Text(text) = &self.value { Some(text) } else { None }
     }
 
+    /// The value in a message.
+    pub(super) fn shown(&self) -> String {
+        shown(&self.value)
+    }
+
     /// Exactly `N` finite numbers.
     pub(super) fn numbers<const N: usize>(&self) -> Option<[f64; N]> {
         let Value::List(items) = &self.value else { return None };
         items.iter().map(Self::number).collect::<Option<Vec<f64>>>()?.try_into().ok()
+    }
+}
+
+impl Value {
+    /// Whether both were typed with the same meaning; lists by their items, in order.
+    pub(super) fn same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Text(a), Self::Text(b)) | (Self::Other(a), Self::Other(b)) => a == b,
+            (Self::Integer(a), Self::Integer(b)) => a == b,
+            (Self::Float(a), Self::Float(b)) => a.to_bits() == b.to_bits(),
+            (Self::Bool(a), Self::Bool(b)) => a == b,
+            (Self::List(a), Self::List(b)) => {
+                a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.value.same(&b.value))
+            }
+            (Self::Table(a), Self::Table(b)) => {
+                a.len() == b.len() && a.iter().all(|(k, v)| b.iter().any(|(l, w)| k == l && v.value.same(&w.value)))
+            }
+            // A date becomes a text when it is written again.
+            (Self::Other(a), Self::Text(b)) | (Self::Text(a), Self::Other(b)) => a == b,
+            _ => false,
+        }
     }
 }
 

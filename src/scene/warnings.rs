@@ -21,9 +21,11 @@ pub(super) fn of(file: &SceneFile, scene: &Scene) -> Vec<String> {
 }
 
 fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
+    let mut used = vec![false; file.materials.len()];
+    scene.objects.iter().for_each(|o| used[o.material] = true);
     for (i, entry) in file.materials.iter().enumerate() {
         let head = format!("{}: material {:?}", entry.at, entry.name);
-        if scene.objects.iter().all(|o| o.material != i) {
+        if !used[i] {
             said.push(format!("{head} is used by no object"));
         } else if let Surface::Translucent(t) = &scene.materials[i].surface {
             let first = if file.method.single == Some(false) { no_first_order(t) } else { None };

@@ -251,6 +251,13 @@ impl Integrator for VolumePath {
         }
     }
 
+    fn pass_bytes(&self, view: View<'_>) -> u64 {
+        let of = |(body, source): (&Option<Body>, &Option<Source>)| {
+            Some(source.as_ref()?.bytes(view, body.as_ref()?, &self.light.lights))
+        };
+        self.bodies.iter().zip(&self.sources).filter_map(of).sum()
+    }
+
     fn parts(&self, scene: &Scene) -> Vec<Part> {
         let mut parts = self.light.parts(scene);
         for (object, (body, source)) in scene.objects.iter().zip(self.bodies.iter().zip(&self.sources)) {

@@ -42,6 +42,10 @@ pub struct Source {
     pub yielding: f32,
 }
 
+/// Photons that tell how many collisions a photon leaves.
+const SOUNDING: u64 = 512;
+/// A kept collision in its task's list, which has room to grow, and among all others; later twice and with its cube.
+const BYTES_PER_PHOTON: f64 = 2.5 * size_of::<Photon>() as f64;
 /// Photons traced by one task.
 const CHUNK: u64 = 64;
 /// Photons of the estimate that sets [`Source::yielding`].
@@ -94,6 +98,25 @@ impl Source {
         }
         tally.1.vertices += photons.len() as u64;
         Cells::new(photons, self.reach)
+    }
+
+    /// Memory of a pass's photons at its most, while they are sorted [bytes], by a few of the first pass.
+    pub fn bytes(&self, view: View<'_>, body: &Body, lights: &Lights) -> u64 {
+        let few = u64::from(self.count).min(SOUNDING);
+        if few == 0 {
+            return 0;
+        }
+        // The first of a sequence lie evenly; a part of it, such as each 256th, need not.
+        let turn = Turn::of(self.seed, 0);
+        let kept: usize = (0..few)
+            .into_par_iter()
+            .map(|i| {
+                let (mut photons, mut rays, mut walks) = (Vec::new(), RayTally::default(), WalkTally::default());
+                self.photon(view, body, lights, (turn, i), &mut photons, (&mut rays, &mut walks));
+                photons.len()
+            })
+            .sum();
+        (kept as f64 / few as f64 * f64::from(self.count) * BYTES_PER_PHOTON) as u64
     }
 
     /// A point of the surface, the light that arrives there if nothing is in its way, and what enters of it.

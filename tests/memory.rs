@@ -1,0 +1,55 @@
+//! The memory that `check` announces is what a render takes: told and taken within a factor of 1.5, 8 MB aside.
+#![cfg(all(feature = "cli", target_os = "linux"))]
+#![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
+
+mod command;
+
+use command::{ball, marmor, text};
+use marmor::film::{Image, Metadata, save};
+use marmor::math::Rgb;
+use marmor::query::Backend;
+use std::fs;
+
+/// What a program and its libraries take anyway, more or less of it in memory.
+const ASIDE: f64 = 8e6;
+/// Told over taken, and taken over told, at the most.
+const FACTOR: f64 = 1.5;
+
+/// Told and taken [bytes] for a ball with these changes.
+fn told_and_taken(folder: &std::path::Path, backend: Backend, more: &[&str]) -> (f64, f64) {
+    let options = [&["--backend", backend.name()], more].concat();
+    let check = marmor(folder, &[&["check", "scene.toml", "--json"], &options[..]].concat());
+    assert!(check.status.success(), "{more:?}: {}", text(&check.stderr));
+    let check: serde_json::Value = serde_json::from_slice(&check.stdout).unwrap();
+    let outputs = ["-q", "-o", "x.exr", "-o", "x.png", "-o", "x.film", "--stats", "s.json", "--spp", "6"];
+    let render = marmor(folder, &[&["render", "scene.toml"], &outputs[..], &options[..]].concat());
+    assert!(render.status.success(), "{more:?}: {}", text(&render.stderr));
+    let stats: serde_json::Value = serde_json::from_slice(&fs::read(folder.join("s.json")).unwrap()).unwrap();
+    (check["memory"]["peak"].as_f64().unwrap(), stats["peak_bytes"].as_f64().unwrap())
+}
+
+#[test]
+fn what_is_told_is_what_is_taken() {
+    let folder = command::folder(&ball([64, 64], "[environment]\nradiance = 1\n[method]\ncache_samples = 1000\n"));
+    let folder = folder.path();
+    let image = Image::from_fn([2048, 1024], |x, y| Rgb::splat((x ^ y) as f32 * 1e-3));
+    save(&image, &folder.join("sky.exr"), &Metadata::default(), Default::default()).unwrap();
+    let fine = ["-D", "object.0.rings=256", "-D", "object.0.segments=512"];
+    let cases: [(&str, &[&str]); 7] = [
+        ("small", &["--method", "direct"]),
+        ("pixels", &["--method", "direct", "-D", "camera.resolution=[700,700]"]),
+        ("triangles, direct", &[&["--method", "direct"][..], &fine].concat()),
+        ("triangles, subsurface", &fine),
+        ("cache", &["-D", "method.cache_samples=400000", "-D", "camera.resolution=[16,16]"]),
+        ("photons", &["--method", "volume_path", "-D", "method.photons=80000", "-D", "camera.resolution=[16,16]"]),
+        ("sky", &["--method", "direct", "-D", "environment.image=sky.exr"]),
+    ];
+    for backend in Backend::ALL.into_iter().filter(|b| b.is_built_in()) {
+        for (name, more) in &cases {
+            let (told, taken) = told_and_taken(folder, backend, more);
+            println!("{} {name}: told {:.0} MB, taken {:.0} MB", backend.name(), told / 1e6, taken / 1e6);
+            assert!(taken <= FACTOR * told + ASIDE, "{} {name}: told {told}, taken {taken}", backend.name());
+            assert!(told <= FACTOR * taken + ASIDE, "{} {name}: told {told}, taken {taken}", backend.name());
+        }
+    }
+}
