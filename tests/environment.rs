@@ -109,6 +109,10 @@ fn a_sun_in_a_picture_lights_what_it_should() {
         // A ball of triangles: normals are interpolated.
         let found = mean(|_| Direct::new(&scene, 8).unwrap(), &scene, 64);
         agree(found, (expected, 0.002 * expected), turn);
+        let options = |seed| VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed };
+        let paths = mean(|seed| VolumePath::new(&scene, options(seed)).unwrap(), &scene, 256);
+        agree(paths, (expected, 0.002 * expected), &format!("paths, {turn}"));
+        assert!(paths.1 < 0.01 * expected, "{paths:?} of {expected}");
     }
 }
 

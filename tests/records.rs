@@ -97,3 +97,48 @@ fn the_clock_stands_while_observers_measure_and_write() {
     assert!(slow.told > 0.0 && slow.told <= slow.at_work, "{} s told, {} s at work", slow.told, slow.at_work);
     assert_eq!(outcome.seconds.total(), slow.told);
 }
+
+/// A wall of 2 x 2 under a lamp from the left and one from the right; `more` stands between the wall and the right one.
+fn two_lamps(radiance: f64, more: &str) -> String {
+    let lamp = |name: &str, x: i32, half: f64, radiance: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nshape = \"rectangle\"\ncentre = [{x}, 0, 2]\nedge_u = [{half}, 0, {half}]\nedge_v = [0, {half}, 0]\n\
+             material = \"{name}\"\n[material.{name}]\ntype = \"emissive\"\nradiance = {radiance}\ntwo_sided = true\n"
+        )
+    };
+    let (left, right) = (lamp("left", -3, 0.5, 1e4), lamp("right", 3, 0.05, radiance));
+    format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 0, 9]\nlook_at = [0, 0, 0]\nfov = 10\nresolution = [64, 48]\n\
+         [[object]]\nshape = \"rectangle\"\ncentre = [0, 0, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 1, 0]\nmaterial = \"wall\"\n\
+         [material.wall]\ntype = \"diffuse\"\nalbedo = 0.5\n{left}{right}{more}"
+    )
+}
+
+#[test]
+fn a_light_that_is_not_met_is_named_in_place_of_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let render = |scene: String, more: &[&str]| {
+        fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        let records = ["render", "scene.toml", "-o", "x.exr", "--records", "r.jsonl", "--target-error", "0.5"];
+        let output = marmor(folder.path(), &[&records, more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        let records = fs::read_to_string(folder.path().join("r.jsonl")).unwrap();
+        (text(&output.stderr), serde_json::from_str::<Value>(records.lines().last().unwrap()).unwrap())
+    };
+    // A millionth of the samples asks for the right one.
+    let (said, last) = render(two_lamps(1.0, ""), &["--spp", "12"]);
+    assert!(said.contains("estimated relMSE: not met yet: \"right\"") && !said.contains("reached"), "{said}");
+    assert_eq!(last["not_met"], serde_json::json!(["right"]));
+    assert!(last["self_relmse"].is_f64() && last["self_interval"].is_null(), "{last}");
+    // Half of them do.
+    let (said, last) = render(two_lamps(1e6, ""), &["--spp", "12"]);
+    assert!(said.contains("reached --target-error") && !said.contains("not met"), "{said}");
+    assert_eq!(last["not_met"], serde_json::json!([]));
+    // Something stands before it: it is waited for, but not for ever.
+    let screen = "[[object]]\nname = \"screen\"\nshape = \"rectangle\"\ncentre = [2, 0, 1.4]\nedge_u = [0.7, 0, 0.7]\nedge_v = [0, 3, 0]\n\
+                  material = \"wall\"\n";
+    let (said, last) = render(two_lamps(1e6, screen), &["--spp", "200"]);
+    assert!(said.contains("reached --target-error") && last["pass"].as_u64() > Some(20), "{said}");
+    let [asked, came] = [0, 1].map(|i| last["rays"]["lights"][2][i].as_u64().unwrap());
+    assert!(asked >= 1 << 16 && came == 0, "{last}");
+}

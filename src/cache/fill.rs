@@ -38,6 +38,14 @@ pub struct Filler<'a> {
     pub density: &'a Density,
 }
 
+/// The way to a light.
+pub struct Shadow {
+    /// Light arrives if nothing is hit on this ray.
+    pub ray: Ray,
+    /// The number of the light, where it is one that is counted.
+    pub light: Option<usize>,
+}
+
 /// Samples filled by one task; their shadow rays form one batch.
 const CHUNK: u64 = 256;
 
@@ -72,7 +80,7 @@ impl Filler<'_> {
             let (at, weight, u) = self.point(number);
             let place = self.density.place(self.stream.numbers(number).0).0;
             let (sample, shadow) = self.entering(at, weight, u, &mut RayTally::default())?;
-            let hidden = shadow.is_some_and(|ray| self.rays.occluded(&ray));
+            let hidden = shadow.is_some_and(|shadow| self.rays.occluded(&shadow.ray));
             (sample.is_finite() && !hidden).then_some((place, sample))
         };
         (0..u64::from(count)).into_par_iter().filter_map(lit).collect()
@@ -85,12 +93,19 @@ impl Filler<'_> {
             let (at, weight, u) = self.point(number);
             candidates.extend(self.entering(at, weight, u, tally));
         }
-        let shadows: Vec<Ray> = candidates.iter().filter_map(|(_, ray)| *ray).collect();
+        let shadows: Vec<Ray> = candidates.iter().filter_map(|(_, shadow)| Some(shadow.as_ref()?.ray)).collect();
         let mut occluded = vec![false; shadows.len()];
         self.rays.occluded_batch(&shadows, &mut occluded);
         tally.shadow += shadows.len() as u64;
         let mut occluded = occluded.into_iter();
-        candidates.retain(|(_, ray)| ray.is_none() || occluded.next() == Some(false));
+        candidates.retain(|(_, shadow)| {
+            let Some(shadow) = shadow else { return true };
+            let open = occluded.next() == Some(false);
+            if let Some(light) = shadow.light {
+                tally.lights.ask(light, open);
+            }
+            open
+        });
         candidates.into_iter().map(|(sample, _)| sample).collect()
     }
 
@@ -101,12 +116,16 @@ impl Filler<'_> {
         weight: f32,
         u: [f32; 5],
         tally: &mut RayTally,
-    ) -> Option<(CachedSample, Option<Ray>)> {
+    ) -> Option<(CachedSample, Option<Shadow>)> {
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         let at = SurfacePoint { n: at.n_geometric, ..at };
         let (arrival, open) = self.arrival(&at, [u[0], u[1], u[2], u[3]], tally)?;
         let sample = self.transmitted(&at, weight, &arrival, u[4])?;
-        Some((sample, (!open).then_some(arrival.shadow)))
+        let shadow = Shadow { ray: arrival.shadow, light: arrival.light };
+        if let (true, Some(light)) = (open, arrival.light) {
+            tally.lights.meet(light);
+        }
+        Some((sample, (!open).then_some(shadow)))
     }
 
     /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
@@ -128,13 +147,16 @@ impl Filler<'_> {
         }
         let (w, ray) = self.lights.look_around(at, [u[1], u[2]])?;
         tally.bounce += 1;
-        let (radiance, by_light) = match self.rays.closest(&ray) {
-            Some(hit) => (emitted(self.scene, &hit, w), self.lights.pdf_angle(self.scene, &hit, w)),
-            None => (self.lights.environment(w), 0.0),
+        let (radiance, by_light, light) = match self.rays.closest(&ray) {
+            Some(hit) => {
+                let (pdf, light) = (self.lights.pdf_angle(self.scene, &hit, w), self.lights.number(hit.mesh));
+                (emitted(self.scene, &hit, w), pdf, light)
+            }
+            None => (self.lights.environment(w), 0.0, self.lights.number_of_sun(w)),
         };
         let pdf_angle = share * self.lights.pdf_around(at, w) + (1.0 - share) * by_light;
         let irradiance = radiance * (at.n.dot(w) / pdf_angle);
-        Some((Arrival { w, irradiance, pdf_angle, shadow: ray }, true))
+        Some((Arrival { w, irradiance, pdf_angle, shadow: ray, light }, true))
     }
 
     /// Cosine-sampled directions, followed to whatever shines there.
@@ -144,15 +166,18 @@ impl Filler<'_> {
             let (at, weight, u) = self.point(number);
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { continue };
             tally.bounce += 1;
-            let radiance = match self.rays.closest(&ray) {
-                Some(hit) => emitted(self.scene, &hit, w),
-                None => self.lights.environment(w),
+            let (radiance, light) = match self.rays.closest(&ray) {
+                Some(hit) => (emitted(self.scene, &hit, w), self.lights.number(hit.mesh)),
+                None => (self.lights.environment(w), self.lights.number_of_sun(w)),
             };
             if !radiance.is_black() {
+                if let Some(light) = light {
+                    tally.lights.meet(light);
+                }
                 lit.extend(self.transmitted(
                     &at,
                     weight,
-                    &Arrival { w, irradiance: radiance * PI, pdf_angle: at.n.dot(w) / PI, shadow: ray },
+                    &Arrival { w, irradiance: radiance * PI, pdf_angle: at.n.dot(w) / PI, shadow: ray, light },
                     u[4],
                 ));
             }

@@ -21,7 +21,7 @@ pub use cut::{Buffer, Cut, CutWork};
 pub use density::{Density, Seen, Survey, seen};
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Gatherer, PLAIN_SUM, Scratch, Tuning};
-pub use fill::Filler;
+pub use fill::{Filler, Shadow};
 pub use near::NearField;
 pub use notes::notes;
 pub use thinned::{Thinning, thinned};

@@ -1,7 +1,7 @@
 //! Light that enters close to an exit, sampled anew for each exit: for media whose light does not come as far as the next
 //! sample of a cache.
 
-use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally};
+use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally, Shadow};
 use crate::bssrdf::{Exit, Partition};
 use crate::math::{DVec3, Frame, Rgb, Vec3};
 use crate::query::{Hit, Ray, RayTally};
@@ -77,7 +77,7 @@ struct Candidate {
     place: DVec3,
     /// Its own place is nowhere: 0.
     sample: CachedSample,
-    shadow: Option<Ray>,
+    shadow: Option<Shadow>,
 }
 
 /// Light that enters at a place.
@@ -258,7 +258,7 @@ impl NearField {
         candidates: Vec<Candidate>,
         (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
     ) -> Vec<Found> {
-        let shadows: Vec<Ray> = candidates.iter().filter_map(|c| c.shadow).collect();
+        let shadows: Vec<Ray> = candidates.iter().filter_map(|c| Some(c.shadow.as_ref()?.ray)).collect();
         let mut hidden = vec![false; shadows.len()];
         Clock::time(&mut clock.rays, || filler.rays.occluded_batch(&shadows, &mut hidden));
         rays.shadow += shadows.len() as u64;
@@ -268,8 +268,14 @@ impl NearField {
         // Where the distance alone decides, all light at one point is one sample.
         let joined = filler.model.gather().is_some();
         for Candidate { surface, n_geometric, place, mut sample, shadow } in candidates {
-            if shadow.is_some() && hidden.next() == Some(true) {
-                continue;
+            if let Some(shadow) = shadow {
+                let open = hidden.next() == Some(false);
+                if let Some(light) = shadow.light {
+                    rays.lights.ask(light, open);
+                }
+                if !open {
+                    continue;
+                }
             }
             let again = std::mem::replace(&mut last, surface) == surface;
             if !again {

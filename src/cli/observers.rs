@@ -4,11 +4,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use marmor::film::metrics::{self, Estimate};
 use marmor::film::{Film, Image, Window};
 use marmor::film::{SelfError, SelfErrors, WorstPixel};
-use marmor::integrator::Tally;
+use marmor::integrator::{KnownLights, Tally};
 use marmor::render::{Observer, Progress, Seconds};
-use marmor::report::{ErrorFigures, Record, RecordFile};
+use marmor::report::{ErrorFigures, Record, RecordFile, SelfFigures};
 use marmor::{Error, Result};
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::io::IsTerminal;
 use std::path::Path;
 use std::rc::Rc;
@@ -25,14 +25,26 @@ pub enum Verbosity {
     Verbose,
 }
 
-/// The newest error that the render told of itself, and what is asked: for the bar, the records and the end.
+/// The newest error that the render told of itself, and the lights that it has not found yet: for the bar, the records and
+/// the end.
 #[derive(Clone, Default)]
-pub struct OwnError(Rc<Cell<Option<SelfErrors>>>);
+pub struct OwnError(Rc<Cell<Option<SelfErrors>>>, Rc<RefCell<Vec<String>>>);
 
 impl OwnError {
     /// The whole estimate.
     pub fn get(&self) -> Option<SelfErrors> {
         self.0.get()
+    }
+
+    /// The names of the lights that have come too seldom: the error is then that of a picture without them.
+    pub fn not_met(&self) -> Vec<String> {
+        self.1.borrow().clone()
+    }
+
+    /// The same in words; empty where all were met.
+    pub fn not_met_text(&self) -> String {
+        let names: Vec<String> = self.1.borrow().iter().map(|name| format!("\"{name}\"")).collect();
+        if names.is_empty() { String::new() } else { format!("not met yet: {}", names.join(", ")) }
     }
 
     /// Its relMSE.
@@ -42,6 +54,12 @@ impl OwnError {
 
     /// What a render of `passes` says of its error at its end.
     pub fn text(&self, passes: u32) -> String {
+        let not_met = self.not_met_text();
+        if !not_met.is_empty() {
+            return format!(
+                "estimated relMSE: {not_met}; too few paths found it for an error to be told: ask for more samples"
+            );
+        }
         let Some(told) = self.get() else {
             return format!("no relMSE is estimated: {passes} of the 2 passes that it needs");
         };
@@ -75,6 +93,7 @@ pub struct Measure {
     /// Stop at this relMSE.
     pub target: Option<f64>,
     told: OwnError,
+    lights: KnownLights,
     error: SelfError,
     next: u32,
 }
@@ -83,9 +102,9 @@ pub struct Measure {
 const FEWEST_PASSES: u32 = 8;
 
 impl Measure {
-    /// Tells `told`.
-    pub fn new(told: OwnError, each_pass: bool, target: Option<f64>) -> Self {
-        Self { each_pass, target, told, error: SelfError::new(), next: 2 }
+    /// Tells `told` of a picture to which `lights` are added.
+    pub fn new(told: OwnError, lights: KnownLights, each_pass: bool, target: Option<f64>) -> Self {
+        Self { each_pass, target, told, lights, error: SelfError::new(), next: 2 }
     }
 }
 
@@ -94,6 +113,7 @@ impl Observer for Measure {
         let passes = progress.film.passes();
         if self.each_pass || passes >= self.next {
             self.told.0.set(self.error.measure(progress.film));
+            *self.told.1.borrow_mut() = self.lights.not_met(progress.tally, progress.film.counts().samples);
             // Measuring costs some milliseconds; steps of 2 % do for a bar and a target.
             self.next = passes + 1 + passes / 50;
         }
@@ -102,6 +122,9 @@ impl Observer for Measure {
 
     fn satisfied(&self) -> bool {
         let Some((target, told)) = self.target.zip(self.told.get()) else { return false };
+        if !self.told.1.borrow().is_empty() {
+            return false;
+        }
         match told.relmse_careful {
             Some(relmse) => self.next > FEWEST_PASSES && relmse <= target,
             // A black picture: nothing else will come.
@@ -194,7 +217,11 @@ impl Observer for ProgressDisplay {
         let (done, left) = self.done(progress);
         let passes = progress.film.passes();
         let elapsed = progress.seconds.total();
+        let not_met = self.own.not_met_text();
         let error = self.own.relmse().map_or(String::new(), |e| {
+            if !not_met.is_empty() {
+                return format!(", {not_met}");
+            }
             let wanted = self.target.map_or(String::new(), |t| format!(" of {t:.1e}"));
             let factor = e.interval.map_or("?".into(), |[low, high]| format!("{:.1}", (high / low).sqrt()));
             format!(", relMSE {:.1e} ×/÷ {factor}{wanted}", e.value)
@@ -261,6 +288,7 @@ impl Records {
             walk: tally.walk,
             error: None,
             own: None,
+            not_met: Vec::new(),
             non_finite: 0,
             clamped: tally.gather.clamped,
             negative: 0,
@@ -275,9 +303,13 @@ impl Observer for Records {
             Some(reference) => Some(error_figures(&progress.film.image(), reference)?),
             None => None,
         };
-        let own = self.own.get().as_ref().map(Into::into);
+        let not_met = self.own.not_met();
+        let mut own: Option<SelfFigures> = self.own.get().as_ref().map(Into::into);
+        if let Some(own) = own.as_mut().filter(|_| !not_met.is_empty()) {
+            own.self_interval = None;
+        }
         let record = Self::record(self.seconds_setup, progress.seconds, progress.tally, progress.film);
-        if let Err(error) = self.file.append(&Record { error, own, ..record }) {
+        if let Err(error) = self.file.append(&Record { error, own, not_met, ..record }) {
             if self.failed.is_none() {
                 eprintln!("warning: {error}; the render goes on");
             }

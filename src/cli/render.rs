@@ -271,7 +271,7 @@ impl Task<'_> {
         let seconds_setup = spent.setup + self.begin.elapsed().as_secs_f64();
         keeper.setup = seconds_setup;
         let (target, each_pass) = (self.args.target_error, self.args.records.is_some());
-        let mut measure = Measure::new(self.own.clone(), each_pass, target);
+        let mut measure = Measure::new(self.own.clone(), method.lights(view.scene), each_pass, target);
         let mut display = ProgressDisplay::new(self.verbosity, self.own.clone(), target);
         let mut records = match &self.args.records {
             Some(path) => {

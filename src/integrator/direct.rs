@@ -1,7 +1,7 @@
 //! Direct light on opaque surfaces: soft shadows of area lights.
 
 use super::shade::DirectLight;
-use super::{CameraRay, Integrator, Part, Tally, View};
+use super::{CameraRay, Integrator, KnownLights, Part, Tally, View};
 use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::error::Result;
 use crate::light::{Lights, emitted};
@@ -64,6 +64,10 @@ impl Integrator for Direct {
                 }
             };
         }
+    }
+
+    fn lights(&self, scene: &Scene) -> KnownLights {
+        KnownLights::asked(scene, &self.light.lights)
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {

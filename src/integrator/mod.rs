@@ -6,6 +6,7 @@ mod direct;
 mod first_order;
 mod local;
 mod losses;
+mod met;
 mod shade;
 mod single;
 mod subsurface;
@@ -23,6 +24,7 @@ pub use direct::Direct;
 pub use first_order::FirstOrder;
 pub use local::{Local, LocalShape};
 pub use losses::{Cause, Loss, Losses, TOLERATED};
+pub use met::KnownLights;
 pub use subsurface::{Subsurface, SubsurfaceOptions};
 pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness};
 pub use volume_path::{Left, VolumePath, VolumePathOptions};
@@ -194,4 +196,9 @@ pub trait Integrator: Sync {
 
     /// What was built for this scene, and what was left out.
     fn parts(&self, scene: &Scene) -> Vec<Part>;
+
+    /// The lights that a render must have found before it can tell its own error; none for methods without lights.
+    fn lights(&self, _: &Scene) -> KnownLights {
+        KnownLights::default()
+    }
 }

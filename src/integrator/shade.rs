@@ -32,7 +32,11 @@ impl DirectLight {
         let mut irradiance = Rgb::BLACK;
         let mut add = |arrival: crate::light::Arrival| {
             tally.rays.shadow += 1;
-            if !view.rays.occluded(&arrival.shadow) {
+            let open = !view.rays.occluded(&arrival.shadow);
+            if let Some(light) = arrival.light {
+                tally.rays.lights.ask(light, open);
+            }
+            if open {
                 irradiance += arrival.irradiance;
             }
         };

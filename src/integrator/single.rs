@@ -10,8 +10,8 @@ use crate::scene::{Scene, Surface};
 
 /// The first order of the objects whose models leave it out: a distance along the refracted ray of the camera, then light
 /// through the boundary, as `volume_path` does both. No formula of a plane is in it, and no model: it is exact on any shape,
-/// for light that comes straight from lamps and environment. Light of small lamps that the boundary reflects inside before it
-/// is scattered is left out: docs/volume-path.md says how much that is.
+/// for light that comes straight from lamps and environment. Light of small lamps and suns that the boundary reflects inside
+/// before it is scattered is left out: docs/volume-path.md says how much that is.
 pub struct Single(VolumePath);
 
 impl Single {

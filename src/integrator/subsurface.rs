@@ -3,7 +3,7 @@
 use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::single::Single;
-use super::{CameraRay, Integrator, Part, Tally, View};
+use super::{CameraRay, Integrator, KnownLights, Part, Tally, View};
 use crate::bssrdf::{Exit, Model, Partition};
 use crate::cache::{
     CachedSample, Clock, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
@@ -376,6 +376,10 @@ impl Integrator for Subsurface {
     fn pass_bytes(&self, _view: View<'_>) -> u64 {
         let samples: u64 = self.bodies.iter().flatten().map(|body| u64::from(body.samples)).sum();
         samples * TAKEN_PER_SAMPLE
+    }
+
+    fn lights(&self, scene: &Scene) -> KnownLights {
+        KnownLights::asked(scene, &self.light.lights)
     }
 
     fn parts(&self, scene: &Scene) -> Vec<Part> {

@@ -1,6 +1,6 @@
 //! Triangle-mesh area lights, and the environment beside them.
 
-use super::{Arrival, LampPoint, Sky};
+use super::{Arrival, CountedLight, LampPoint, Sky, SunDirection};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
@@ -32,6 +32,9 @@ struct Emitter {
 }
 
 impl Lights {
+    /// The number of the suns; lamps have those after it.
+    pub const SUNS: usize = 0;
+
     /// The lights of a scene; an emissive mesh without area or radiance is no light.
     pub fn new(scene: &Scene) -> Self {
         let mut emitters = Vec::new();
@@ -64,6 +67,62 @@ impl Lights {
     /// Whether light arrives from the environment.
     pub fn has_environment(&self) -> bool {
         !self.sky.is_black()
+    }
+
+    /// Each light that is counted: all that can be asked for. Others, such as an even sky, no path misses.
+    pub fn counted(&self, scene: &Scene) -> Vec<CountedLight> {
+        let name = "the bright part of the environment's picture".to_string();
+        let suns = self.has_suns().then_some(CountedLight { number: Self::SUNS, name, chance: 1.0 });
+        let mut below = 0.0;
+        let lamp = |(i, (e, &sum)): (usize, (&Emitter, &f64))| {
+            let chance = sum - std::mem::replace(&mut below, sum);
+            CountedLight { number: Self::SUNS + 1 + i, name: scene.objects[e.object as usize].name.clone(), chance }
+        };
+        suns.into_iter().chain(self.emitters.iter().zip(&self.cumulative).enumerate().map(lamp)).collect()
+    }
+
+    /// The number of the object number `object`; `None` if it is no light.
+    pub fn number(&self, object: u32) -> Option<usize> {
+        self.emitters.iter().position(|e| e.object == object).map(|i| Self::SUNS + 1 + i)
+    }
+
+    /// The number of the suns, if one is in the direction `w`.
+    pub fn number_of_sun(&self, w: Vec3) -> Option<usize> {
+        (self.pdf_sun(w) > 0.0).then_some(Self::SUNS)
+    }
+
+    /// Whether a picture of the environment has suns: parts so bright that they are asked for like lamps.
+    pub fn has_suns(&self) -> bool {
+        self.sky.has_suns()
+    }
+
+    /// Share of the environment's light that comes from elsewhere than suns.
+    pub fn share_beside_suns(&self) -> f32 {
+        self.sky.share_beside_suns()
+    }
+
+    /// Mean radiance of the suns, by what they send; 0 without any.
+    pub fn radiance_of_suns(&self) -> f32 {
+        self.sky.radiance_of_suns()
+    }
+
+    /// A direction of the suns, picked by what they send; `None` without any.
+    pub fn sun(&self, u: [f32; 3]) -> Option<SunDirection> {
+        self.sky.sun(u)
+    }
+
+    /// Chance per solid angle [1/sr] of `w` by [`Self::sun`]; 0 where no sun is.
+    #[inline]
+    pub fn pdf_sun(&self, w: Vec3) -> f32 {
+        self.sky.pdf_sun(w)
+    }
+
+    /// Light from a direction of the suns; `None` where it comes from behind the surface.
+    pub fn sample_sun(&self, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
+        let SunDirection { w, radiance, pdf_angle } = self.sun(u)?;
+        let (w, shadow) = looking(at, w)?;
+        let irradiance = radiance * (at.n.dot(w) / pdf_angle);
+        Some(Arrival { w, irradiance, pdf_angle, shadow, light: Some(Self::SUNS) })
     }
 
     /// Radiance from outside the scene out of the direction of the unit vector `w`; black without an environment.
@@ -108,7 +167,7 @@ impl Lights {
         let sample = emitter.table.sample(within, [u[1], u[2]]);
         let at = scene.objects[emitter.object as usize].mesh.point(sample.triangle, sample.u, sample.v);
         let Emitter { object, radiance, two_sided, pdf_area, .. } = *emitter;
-        Some(LampPoint { at, object, radiance, two_sided, pdf_area })
+        Some(LampPoint { at, object, radiance, two_sided, pdf_area, light: Self::SUNS + 1 + chosen })
     }
 
     /// Chance per area [1/unit²] that [`Self::point`] picks a point of the object number `object`; 0 if it is no light.
@@ -133,7 +192,8 @@ impl Lights {
         // Divided one length at a time: distance² leaves the range of f32 long before the quotient does.
         let solid_angle = cos_light / distance / distance / lamp.pdf_area;
         let shadow = Ray::between(at.leave(w), lamp.at.arrive(w, at.x, at.error));
-        Some(Arrival { w, irradiance: lamp.radiance * (cos * solid_angle), pdf_angle: 1.0 / solid_angle, shadow })
+        let irradiance = lamp.radiance * (cos * solid_angle);
+        Some(Arrival { w, irradiance, pdf_angle: 1.0 / solid_angle, shadow, light: Some(lamp.light) })
     }
 
     /// Light of the environment from one of the directions of [`Self::look_around`].
@@ -141,7 +201,7 @@ impl Lights {
         let (w, shadow) = self.look_around(at, u)?;
         let pdf_angle = self.pdf_around(at, w);
         let irradiance = self.sky.radiance(w) * (at.n.dot(w) / pdf_angle);
-        Some(Arrival { w, irradiance, pdf_angle, shadow })
+        Some(Arrival { w, irradiance, pdf_angle, shadow, light: self.number_of_sun(w) })
     }
 
     /// Chance per solid angle [1/sr] that [`Self::sample_emitter`] looks from `x` along the unit vector `w` to `hit`.

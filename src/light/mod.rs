@@ -3,13 +3,14 @@
 
 mod emitters;
 mod sky;
+mod suns;
 
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::scene::{Scene, Surface};
 pub use emitters::Lights;
-pub use sky::Sky;
+pub use sky::{Sky, SunDirection};
 
 /// One sampled direction from which light may arrive.
 #[derive(Clone, Copy, Debug)]
@@ -23,6 +24,19 @@ pub struct Arrival {
     pub pdf_angle: f32,
     /// Light arrives if nothing is hit on this ray.
     pub shadow: Ray,
+    /// The number of the light, where it is one that is counted: see [`Lights::counted`].
+    pub light: Option<usize>,
+}
+
+/// A light of which it is counted how often it was asked for.
+#[derive(Clone, Debug)]
+pub struct CountedLight {
+    /// Its number in the tally.
+    pub number: usize,
+    /// What the user calls it.
+    pub name: String,
+    /// Chance that it is the one that is asked for.
+    pub chance: f64,
 }
 
 /// A point of an area light.
@@ -38,6 +52,8 @@ pub struct LampPoint {
     pub two_sided: bool,
     /// Chance of the point per area [1/unit²].
     pub pdf_area: f32,
+    /// The number of the light.
+    pub light: usize,
 }
 
 impl LampPoint {

@@ -1,5 +1,6 @@
 //! The environment: the same radiance all around, or a picture of all directions with a table of where it shines.
 
+use super::suns::Suns;
 use crate::film::Image;
 use crate::math::{Rgb, Vec3};
 use crate::sampling::cosine_hemisphere;
@@ -12,6 +13,18 @@ use std::sync::Arc;
 pub struct Sky {
     radiance: Rgb,
     picture: Option<Picture>,
+    suns: Option<Suns>,
+}
+
+/// A direction of the bright part of a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct SunDirection {
+    /// Unit direction towards the light.
+    pub w: Vec3,
+    /// Radiance from there.
+    pub radiance: Rgb,
+    /// Chance per solid angle [1/sr].
+    pub pdf_angle: f32,
 }
 
 /// Share of the directions that are picked by where a picture shines; the rest by the cosine, so that a picture's dark half,
@@ -23,7 +36,42 @@ impl Sky {
     pub fn new(environment: &Environment) -> Self {
         let picture = environment.image.clone().map(|image| Picture::new(image, environment.turn));
         let dark = environment.is_black() || picture.as_ref().is_some_and(Picture::is_black);
-        Self { radiance: if dark { Rgb::BLACK } else { environment.radiance }, picture: picture.filter(|_| !dark) }
+        let picture = picture.filter(|_| !dark);
+        let suns = picture.as_ref().and_then(Suns::new);
+        Self { radiance: if dark { Rgb::BLACK } else { environment.radiance }, picture, suns }
+    }
+
+    /// Whether a picture has parts so much brighter than its mean that paths should not wait for them.
+    pub fn has_suns(&self) -> bool {
+        self.suns.is_some()
+    }
+
+    /// Share of all its light that does not come from suns; 1 without any.
+    pub fn share_beside_suns(&self) -> f32 {
+        self.suns.as_ref().map_or(1.0, |suns| suns.beside)
+    }
+
+    /// Mean radiance of the suns, by what they send; 0 without any.
+    pub fn radiance_of_suns(&self) -> f32 {
+        self.suns.as_ref().map_or(0.0, |suns| suns.radiance * self.radiance.mean())
+    }
+
+    /// A direction of the suns, by what they send.
+    pub fn sun(&self, u: [f32; 3]) -> Option<SunDirection> {
+        let (picture, suns) = (self.picture.as_ref()?, self.suns.as_ref()?);
+        let w = suns.sample(picture, u);
+        // A direction within rounding of its patch's edge may be found in the next.
+        let pdf_angle = suns.pdf(picture, w);
+        (pdf_angle > 0.0).then(|| SunDirection { w, radiance: self.radiance(w), pdf_angle })
+    }
+
+    /// Chance per solid angle [1/sr] of the unit vector `w` by [`Self::sun`]; 0 where no sun is.
+    #[inline]
+    pub fn pdf_sun(&self, w: Vec3) -> f32 {
+        match (&self.picture, &self.suns) {
+            (Some(picture), Some(suns)) => suns.pdf(picture, w),
+            _ => 0.0,
+        }
     }
 
     /// Whether no light comes from it.
@@ -63,17 +111,23 @@ impl Sky {
     pub fn text(&self) -> String {
         match &self.picture {
             None => "constant, sampled by the cosine".into(),
-            Some(p) => format!("{} x {} pixels, sampled by what they send and by the cosine", p.width, p.height),
+            Some(p) => {
+                let suns = self.suns.as_ref().map_or(String::new(), |suns| {
+                    let share = 100.0 * (1.0 - suns.beside);
+                    format!("; {share:.1} % of its light is from suns, which are asked for like lamps")
+                });
+                format!("{} x {} pixels, sampled by what they send and by the cosine{suns}", p.width, p.height)
+            }
         }
     }
 }
 
 /// A picture of all directions, interpolated between its pixels' centres. A patch is what lies between four of them; the
 /// first and the last row of patches, half as high, lie between a row of pixels and a pole.
-struct Picture {
+pub(super) struct Picture {
     image: Arc<Image>,
-    width: usize,
-    height: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
     /// Turn about the y axis [turns].
     turn: f32,
     /// Chance of each row of patches and of all above it.
@@ -136,9 +190,26 @@ impl Picture {
         [at(above, i), at(above, right), at(below, i), at(below, right)]
     }
 
+    /// Means over the channels at the corners of the patch `i` of row `k`, in the order of [`Self::corners`].
+    #[inline]
+    pub(super) fn values(&self, k: usize, i: usize) -> [f64; 4] {
+        self.corners(k, i).map(|p| p.mean().into())
+    }
+
+    /// Where in the row `k` of patches the cosine `y` from +y lies, even in solid angle.
+    #[inline]
+    pub(super) fn down(&self, k: usize, y: f32) -> f64 {
+        ((self.cosines[k] - f64::from(y)) / (self.cosines[k] - self.cosines[k + 1])).clamp(0.0, 1.0)
+    }
+
+    /// Solid angle of each patch of row `k` [sr].
+    pub(super) fn solid_angle(&self, k: usize) -> f64 {
+        TAU64 / self.width as f64 * (self.cosines[k] - self.cosines[k + 1])
+    }
+
     /// Row and column of the patch in the direction `w`, and the place in it, to the right and downwards.
     #[inline]
-    fn patch(&self, w: Vec3) -> (usize, usize, [f32; 2]) {
+    pub(super) fn patch(&self, w: Vec3) -> (usize, usize, [f32; 2]) {
         // As atan2 counts, +z is half a turn and +x a quarter.
         let across = (w.x.atan2(-w.z) / (2.0 * PI) + self.turn).rem_euclid(1.0) * self.width as f32 - 0.5;
         let down = w.x.hypot(w.z).atan2(w.y) / PI * self.height as f32 + 0.5;
@@ -171,6 +242,11 @@ impl Picture {
         let ([above, rows], [left, columns]) = self.chance(k, i);
         let y = ((pick - above) / (rows - above)).clamp(0.0, 1.0);
         let x = f64::from(((v - left) / (columns - left)).clamp(0.0, 1.0));
+        self.direction(k, i, [x, y])
+    }
+
+    /// The direction at the place `x`, `y` in [0, 1] of the patch `i` of row `k`; even numbers are even in solid angle.
+    pub(super) fn direction(&self, k: usize, i: usize, [x, y]: [f64; 2]) -> Vec3 {
         let cosine = self.cosines[k] + y * (self.cosines[k + 1] - self.cosines[k]);
         let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
         let angle = TAU64 * ((i as f64 + 0.5 + x) / self.width as f64 - f64::from(self.turn));
@@ -181,13 +257,12 @@ impl Picture {
     fn pdf(&self, w: Vec3) -> f32 {
         let (k, i, _) = self.patch(w);
         let ([above, rows], [left, columns]) = self.chance(k, i);
-        let solid = TAU64 / self.width as f64 * (self.cosines[k] - self.cosines[k + 1]);
-        ((rows - above) * f64::from(columns - left) / solid) as f32
+        ((rows - above) * f64::from(columns - left) / self.solid_angle(k)) as f32
     }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::math::{hash, unit_f32};
 
@@ -195,7 +270,7 @@ mod tests {
         [0, 1].map(|i| unit_f32((hash(2 * seed + i) >> 32) as u32))
     }
 
-    fn sky(resolution: [u32; 2], turn: f32, pixel: impl FnMut(u32, u32) -> Rgb) -> Sky {
+    pub fn sky(resolution: [u32; 2], turn: f32, pixel: impl FnMut(u32, u32) -> Rgb) -> Sky {
         let image = Some(Arc::new(Image::from_fn(resolution, pixel)));
         Sky::new(&Environment { radiance: Rgb::splat(2.0), image, turn })
     }

@@ -14,7 +14,7 @@ mod embree;
 mod exact;
 mod tally;
 
-pub use tally::RayTally;
+pub use tally::{LIGHTS, LightTally, RayTally};
 
 /// Points `origin + t * direction` with `t_min` < t < `t_max`.
 #[derive(Clone, Copy, Debug)]

@@ -41,6 +41,8 @@ pub struct Record {
     /// Distance to what the picture converges to, told by its halves; absent before two passes.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub own: Option<SelfFigures>,
+    /// Lights that have come too seldom for an interval: what the halves tell is the error of a picture without them.
+    pub not_met: Vec<String>,
     /// Samples left out because they are not numbers.
     pub non_finite: u64,
     /// Values of S_d below zero that were taken as 0; samples are never clamped.
@@ -67,7 +69,7 @@ pub struct SelfFigures {
     pub self_rmse: f64,
     /// relMSE; `null` if the picture is black.
     pub self_relmse: Option<f64>,
-    /// 95 % interval of `self_relmse`; `null` before four passes.
+    /// 95 % interval of `self_relmse`; `null` before four passes, and while a light is not met.
     pub self_interval: Option<[f64; 2]>,
 }
 

@@ -6,10 +6,10 @@ use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
 use super::spectrum::Spectrum;
-use super::through::{lamp_light, share_by_chance};
+use super::through::{lamp_light, share_by_chance, sun_light, sun_share_by_chance};
 use crate::geometry::SurfacePoint;
 use crate::integrator::{Tally, View, WalkTally};
-use crate::light::emitted;
+use crate::light::{Arrival, Lights, emitted};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
@@ -28,7 +28,7 @@ pub struct CameraPath<'a> {
     /// Numbers for connections, so that they do not disturb the walk's.
     pub coins: Draws,
     pub spectrum: Spectrum,
-    /// Share of lamps that the next exit from the present body may meet: photons have the rest.
+    /// Share of lamps and suns that the next exit from the present body may meet: photons have the rest.
     pub direct: f32,
     /// Share of all other light.
     pub other: f32,
@@ -36,6 +36,8 @@ pub struct CameraPath<'a> {
     pub order: u32,
     /// Whether a lamp that is met counts: not where one was asked for at the last surface.
     pub meets_lamps: bool,
+    /// Density [1/sr] of the present direction, where suns were asked for at the last, Lambertian surface.
+    pub by_cosine: Option<f32>,
     /// The body that was just left, and how.
     pub left: Option<(&'a Body, Option<Straight>)>,
     pub radiance: Rgb,
@@ -58,9 +60,7 @@ impl<'a> CameraPath<'a> {
         for bounces in 0_u32.. {
             self.tally.rays.bounce += 1;
             let Some(hit) = self.view.rays.closest(&ray) else {
-                self.add(
-                    self.spectrum.value_outside() * self.method.light.lights.environment(ray.direction) * self.other,
-                );
+                self.meet_sky(ray.direction);
                 return;
             };
             let Some(next) = self.meet(&hit, ray.direction) else { return };
@@ -75,7 +75,7 @@ impl<'a> CameraPath<'a> {
     pub fn meet_light(&mut self, ray: &Ray) {
         self.tally.rays.bounce += 1;
         match self.view.rays.closest(ray) {
-            None => self.add(self.spectrum.value_outside() * self.method.light.lights.environment(ray.direction)),
+            None => self.meet_sky(ray.direction),
             Some(hit) => {
                 let share = self.left.map_or(1.0, |(body, straight)| match straight {
                     // Met by chance alone, and seldom: white specks.
@@ -83,8 +83,48 @@ impl<'a> CameraPath<'a> {
                     None => 1.0,
                     Some(_) => self.share(&hit, ray.direction),
                 });
-                self.add(self.spectrum.value_outside() * emitted(self.view.scene, &hit, ray.direction) * share);
+                self.add_lamp(&hit, ray.direction, share);
             }
+        }
+    }
+
+    /// Adds a share of a lamp that is met by chance.
+    fn add_lamp(&mut self, hit: &Hit, direction: Vec3, share: f32) {
+        let light = self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * share;
+        if let (false, Some(number)) = (light.is_black(), self.method.light.lights.number(hit.mesh)) {
+            self.tally.rays.lights.meet(number);
+        }
+        self.add(light);
+    }
+
+    /// Adds the environment.
+    fn meet_sky(&mut self, w: Vec3) {
+        let lights = &self.method.light.lights;
+        let share = match lights.pdf_sun(w) {
+            by_table if by_table > 0.0 => {
+                let share = self.direct * self.share_of_sun(by_table);
+                if share > 0.0 {
+                    self.tally.rays.lights.meet(Lights::SUNS);
+                }
+                share
+            }
+            _ => self.other,
+        };
+        self.add(self.spectrum.value_outside() * lights.environment(w) * share);
+    }
+
+    /// The share of a sun's light that a path meets by chance where suns, drawn with density `by_table` there, were asked
+    /// for before.
+    fn share_of_sun(&self, by_table: f32) -> f32 {
+        match (self.by_cosine, &self.left) {
+            (Some(by_cosine), _) => by_cosine / (by_cosine + by_table),
+            (None, Some((body, Some(straight)))) => sun_share_by_chance(body, straight, by_table),
+            // Met by chance alone, and seldom: white specks, which single scattering beside models leaves out.
+            (None, Some((body, None))) if self.method.once => {
+                let alone = body.through.as_ref().is_some_and(|t| t.sun_alone(by_table));
+                if alone { 0.0 } else { 1.0 }
+            }
+            _ => 1.0,
         }
     }
 
@@ -108,7 +148,7 @@ impl<'a> CameraPath<'a> {
             Surface::Emissive { .. } => {
                 if self.meets_lamps {
                     let share = self.direct * self.share(hit, direction);
-                    self.add(self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * share);
+                    self.add_lamp(hit, direction, share);
                 }
                 None
             }
@@ -124,7 +164,7 @@ impl<'a> CameraPath<'a> {
                     return None;
                 }
                 let mu = -at.n_geometric.dot(direction);
-                self.meets_lamps = true;
+                (self.meets_lamps, self.by_cosine) = (true, None);
                 if self.draws.number() < reflectance(body.eta, mu) {
                     let w = reflect(-direction, at.n_geometric);
                     return Some(Ray::new(at.leave(w), w));
@@ -146,6 +186,16 @@ impl<'a> CameraPath<'a> {
         outside
     }
 
+    /// Whether light arrives.
+    fn open(&mut self, arrival: &Arrival) -> bool {
+        self.tally.rays.shadow += 1;
+        let open = !self.view.rays.occluded(&arrival.shadow);
+        if let Some(light) = arrival.light {
+            self.tally.rays.lights.ask(light, open);
+        }
+        open
+    }
+
     fn diffuse(&mut self, at: &SurfacePoint, albedo: Rgb) -> Option<Ray> {
         self.direct = self.other;
         if self.other <= 0.0 {
@@ -156,9 +206,19 @@ impl<'a> CameraPath<'a> {
         if lights.has_emitters() {
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
             if let Some(arrival) = lights.sample_emitter(self.view.scene, at, u) {
-                self.tally.rays.shadow += 1;
-                if !self.view.rays.occluded(&arrival.shadow) {
+                if self.open(&arrival) {
                     self.add(self.spectrum.value_outside() * arrival.irradiance * (FRAC_1_PI * self.other));
+                }
+            }
+        }
+        if lights.has_suns() {
+            let u = [self.draws.number(), self.draws.number(), self.draws.number()];
+            if let Some(arrival) = lights.sample_sun(at, u) {
+                if self.open(&arrival) {
+                    // The balance heuristic [VG95] with the cosine by which the path goes on.
+                    let share = arrival.pdf_angle / (arrival.pdf_angle + at.n.dot(arrival.w) * FRAC_1_PI);
+                    let light = arrival.irradiance * (FRAC_1_PI * share * self.other);
+                    self.add(self.spectrum.value_outside() * light);
                 }
             }
         }
@@ -166,7 +226,7 @@ impl<'a> CameraPath<'a> {
             return None;
         }
         let w = cosine_hemisphere(at.n, self.draws.pair());
-        self.meets_lamps = false;
+        (self.meets_lamps, self.by_cosine) = (false, Some(at.n.dot(w) * FRAC_1_PI));
         (at.n_geometric.dot(w) > 0.0).then(|| Ray::new(at.leave(w), w))
     }
 
@@ -185,7 +245,7 @@ impl<'a> CameraPath<'a> {
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let exit = exit?;
-        self.meets_lamps = true;
+        (self.meets_lamps, self.by_cosine) = (true, None);
         self.left = Some((body, exit.straight));
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
@@ -224,9 +284,15 @@ impl Watch for Gather<'_, '_> {
         }
         let orders = path.method.options.orders;
         if body.through.is_some() && orders.contains(path.order) {
-            let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut path.tally.walk);
-            let lamps = (body, &path.method.light.lights);
-            path.radiance += lamp_light(path.view, lamps, (x, w), spectrum, found, coins, tally) * path.direct;
+            let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut *path.tally);
+            let lights = &path.method.light.lights;
+            let (view, from) = (path.view, (body, lights));
+            if lights.has_emitters() {
+                path.radiance += lamp_light(view, from, (x, w), spectrum, found, coins, tally) * path.direct;
+            }
+            if lights.has_suns() {
+                path.radiance += sun_light(view, from, (x, w), spectrum, found, coins, tally) * path.direct;
+            }
             if path.method.points_are_all(body) {
                 return false;
             }

@@ -1,4 +1,4 @@
-//! All facets of a body through which light from one point outside is refracted to one point inside.
+//! All facets of a body through which light from one point outside, or from one direction, is refracted to one point inside.
 
 use crate::geometry::Mesh;
 use crate::math::{DVec3, Vec3};
@@ -44,10 +44,19 @@ pub struct Crossing {
     pub outside: Vec3,
 }
 
+/// Where the light comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum Towards {
+    /// A point outside.
+    Point(DVec3),
+    /// Endlessly far away, in the direction of this unit vector.
+    Direction(Vec3),
+}
+
 /// The lengths and cosines of a line that is bent at a plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bend {
-    /// Lengths inside and outside [unit].
+    /// Lengths inside and outside [unit]; the latter may be infinite.
     pub lengths: [f64; 2],
     /// Cosines of the angles to the normal inside and outside.
     pub cosines: [f64; 2],
@@ -62,6 +71,12 @@ impl Bend {
     pub fn focus(&self, eta: f64) -> f64 {
         let ([l, far], [c, cos]) = (self.lengths, self.cosines);
         1.0 / ((l + eta * far) * (l * cos / c + eta * far * c / cos))
+    }
+
+    /// Solid angle inside per solid angle outside, for parallel light: the limit of L² times [`Self::focus`].
+    pub fn focus_of_directions(&self, eta: f64) -> f64 {
+        let [c, cos] = self.cosines;
+        cos / (eta * eta * c)
     }
 }
 
@@ -128,12 +143,16 @@ impl Facets {
 
     /// Puts into `found` every crossing between `x`, inside, and `p`, outside, that is at most `horizon` from `x`;
     /// whether anything stands in the way is not asked. Returns how many nodes were looked at.
-    pub fn crossings(&self, mesh: &Mesh, x: DVec3, p: DVec3, horizon: f32, found: &mut Vec<Crossing>) -> u32 {
+    pub fn crossings(&self, mesh: &Mesh, x: DVec3, p: Towards, horizon: f32, found: &mut Vec<Crossing>) -> u32 {
         found.clear();
         // Halving leaves one node for each level below the first: 32 for 2^32 triangles.
         let (mut stack, mut waiting, mut seen) = ([0_u32; 40], 0, 0);
         let mut index = 0_u32;
-        let [local, lamp] = [x, p].map(|q| (q - self.origin).as_vec3());
+        let local = (x - self.origin).as_vec3();
+        let lamp = match p {
+            Towards::Point(p) => Towards::Point(p - self.origin),
+            Towards::Direction(w) => Towards::Direction(w),
+        };
         loop {
             let node = &self.nodes[index as usize];
             seen += 1;
@@ -145,7 +164,7 @@ impl Facets {
                     continue;
                 }
                 for &triangle in &self.order[node.first as usize..(node.first + node.count) as usize] {
-                    let crossing = self.crossing(mesh, triangle, x, p);
+                    let crossing = self.at(mesh, triangle, x, p);
                     found.extend(crossing.filter(|c| c.bend.lengths[0] <= horizon.into()));
                 }
             }
@@ -157,26 +176,34 @@ impl Facets {
         }
     }
 
-    /// False only if no facet of `node` refracts light from `p` to `x`.
+    /// False only if no facet of `node` refracts light from `p` to `x`, both relative to [`Self::origin`].
     ///
     /// With unit directions u from x to the facet and v from there to p, Snell's law is that η u - v is along the normal:
     /// outwards for η > 1, inwards below. Over the ball, u and v are known up to angles, so that vector up to a
     /// distance, which must let it be in the cone of the normals. And u and v differ by no more than the boundary can turn.
     #[inline]
-    fn may_hold(&self, node: &Node, x: Vec3, p: Vec3, horizon: f32) -> bool {
-        let (to, from) = (node.centre - x, p - node.centre);
+    fn may_hold(&self, node: &Node, x: Vec3, p: Towards, horizon: f32) -> bool {
+        let to = node.centre - x;
         let near2 = to.length_squared();
         let reach = horizon + node.radius;
         if near2 > reach * reach {
             return false;
         }
         // What rounding does to places is in the radius, to angles in the slack.
-        let (near, far) = (1.0 / near2.sqrt(), 1.0 / from.length());
-        let (sine_u, sine_v) = (node.radius * near + SLACK, node.radius * far + SLACK);
+        let near = 1.0 / near2.sqrt();
+        let (v, sine_v) = match p {
+            Towards::Point(p) => {
+                let from = p.as_vec3() - node.centre;
+                let far = 1.0 / from.length();
+                (from * far, node.radius * far + SLACK)
+            }
+            Towards::Direction(w) => (w, SLACK),
+        };
+        let sine_u = node.radius * near + SLACK;
         if !(sine_u < 1.0 && sine_v < 1.0) {
             return true;
         }
-        let (u, v) = (to * near, from * far);
+        let u = to * near;
         // Cosines from below.
         let below = |sine: f32| 1.0 - 0.5 * sine * sine * (1.0 + sine * sine);
         let (cos_u, cos_v) = (below(sine_u), below(sine_v));
@@ -201,7 +228,14 @@ impl Facets {
     }
 
     /// The crossing at one facet.
-    fn crossing(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: DVec3) -> Option<Crossing> {
+    fn at(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: Towards) -> Option<Crossing> {
+        match p {
+            Towards::Point(p) => self.from_point(mesh, triangle, x, p),
+            Towards::Direction(w) => self.from_direction(mesh, triangle, x, w),
+        }
+    }
+
+    fn from_point(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: DVec3) -> Option<Crossing> {
         let corners = mesh.corners(triangle).map(|q| q - x);
         let [a, b, c] = corners;
         let scaled = (b - a).cross(c - a);
@@ -246,6 +280,38 @@ impl Facets {
             bend: Bend { lengths: [inner, outer], cosines: [depth / inner, height / outer] },
             inside: (y / inner).as_vec3(),
             outside: ((lamp - y) / outer).as_vec3(),
+        })
+    }
+}
+
+impl Facets {
+    /// Parallel light: Snell's law gives the direction inside at once.
+    fn from_direction(&self, mesh: &Mesh, triangle: u32, x: DVec3, w: Vec3) -> Option<Crossing> {
+        let [a, b, c] = mesh.corners(triangle).map(|q| q - x);
+        let scaled = (b - a).cross(c - a);
+        let size = scaled.length();
+        let (n, outside) = (scaled / size, w.as_dvec3());
+        let (depth, cosine) = (a.dot(n), outside.dot(n));
+        if !(depth > 0.0 && cosine > 0.0) {
+            return None;
+        }
+        let along = (outside - n * cosine) / self.eta;
+        let cosine_inside = (1.0 - along.length_squared()).max(0.0).sqrt();
+        if cosine_inside <= 0.0 {
+            return None;
+        }
+        let inside = along + n * cosine_inside;
+        let length = depth / cosine_inside;
+        let y = inside * length;
+        let u = (y - a).cross(c - a).dot(n) / size;
+        let v = (b - a).cross(y - a).dot(n) / size;
+        (u >= 0.0 && v >= 0.0 && u + v <= 1.0).then(|| Crossing {
+            triangle,
+            u,
+            v,
+            bend: Bend { lengths: [length, f64::INFINITY], cosines: [cosine_inside, cosine] },
+            inside: inside.as_vec3(),
+            outside: w,
         })
     }
 }
@@ -365,19 +431,22 @@ mod tests {
             let facets = Facets::new(&mesh, eta).unwrap();
             for i in 0..300 {
                 let x = point(i) * 0.7;
-                // From far away, from near, and from another side of the same body.
-                let p = point(i + 1000) * [60.0, 4.0, 1.6][(i % 3) as usize];
-                let horizon = [f32::INFINITY, 0.8][(i % 2) as usize];
+                // From a direction, from far away, from near, and from another side of the same body.
+                let p = match [f64::INFINITY, 60.0, 4.0, 1.6][(i % 4) as usize] {
+                    f64::INFINITY => Towards::Direction(point(i + 1000).normalize().as_vec3()),
+                    far => Towards::Point(point(i + 1000) * far),
+                };
+                let horizon = [f32::INFINITY, 0.8][(i / 4 % 2) as usize];
                 nodes += facets.crossings(&mesh, x, p, horizon, &mut found);
                 queries += 1;
                 let mut all: Vec<Crossing> = (0..mesh.triangles.len() as u32)
                     .filter(|&t| mesh.area(t) > 0.0)
-                    .filter_map(|t| facets.crossing(&mesh, t, x, p))
+                    .filter_map(|t| facets.at(&mesh, t, x, p))
                     .filter(|c| c.bend.lengths[0] <= f64::from(horizon))
                     .collect();
                 found.sort_by_key(|c| c.triangle);
                 all.sort_by_key(|c| c.triangle);
-                assert_eq!(found, all, "eta {eta}, {x} to {p}");
+                assert_eq!(found, all, "eta {eta}, {x} to {p:?}");
                 total += all.len();
                 for c in &all {
                     let at = mesh.point(c.triangle, c.u, c.v);
@@ -415,6 +484,10 @@ mod tests {
             let expected = cos.powi(3) / (area * out);
             let bend = Bend { lengths: [depth / cos, height / out], cosines: [cos, out] };
             assert!((bend.focus(eta) / expected - 1.0).abs() < 1e-6, "eta {eta}: {} {expected}", bend.focus(eta));
+            // Parallel light is that of a point endlessly far away.
+            let far = 1e9;
+            let limit = far * far * Bend { lengths: [bend.lengths[0], far], ..bend }.focus(eta);
+            assert!((bend.focus_of_directions(eta) / limit - 1.0).abs() < 1e-6, "eta {eta}: {limit}");
         }
     }
 }

@@ -4,6 +4,8 @@
 mod body;
 mod camera;
 mod cells;
+#[cfg(test)]
+mod checks;
 mod connect;
 mod draws;
 mod facets;
@@ -13,7 +15,7 @@ mod spectrum;
 mod through;
 
 use super::shade::DirectLight;
-use super::{CameraRay, Cause, Integrator, Part, Tally, View, WalkTally};
+use super::{CameraRay, Cause, Integrator, KnownLights, Part, Tally, View, WalkTally};
 use crate::error::{Error, Result};
 use crate::geometry::Clearance;
 use crate::light::{Lights, emitted};
@@ -36,7 +38,7 @@ use through::Through;
 pub struct VolumePathOptions {
     /// How often the light may have been scattered in media.
     pub orders: Orders,
-    /// Photons traced from the area lights into each body in a pass; 0 for none.
+    /// Photons traced from area lights and suns into each body in a pass; 0 for none.
     pub photons: u32,
     /// Whether the camera sees mirror images on bodies.
     pub specular: bool,
@@ -52,7 +54,7 @@ pub struct VolumePath {
     /// One for each object; `None` where it is not translucent.
     bodies: Vec<Option<Body>>,
     sources: Vec<Option<Source>>,
-    /// Chance that a path goes on for light other than that of lamps on the body itself, once photons have that.
+    /// Chance that a path goes on for light other than that of lamps and suns on the body itself, once photons have that.
     persistence: f32,
     /// The body that the camera stands in.
     camera_in: Option<u32>,
@@ -79,8 +81,9 @@ impl VolumePath {
         let bodies: Vec<Option<Body>> =
             (0..scene.objects.len()).map(|i| body(scene, &lights, i, CLEARANCE_CELLS)).collect();
         let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
+        let shines = lights.has_emitters() || lights.has_suns();
         let source = |body: &Option<Body>| {
-            let body = body.as_ref().filter(|_| multiple && options.photons > 0 && lights.has_emitters())?;
+            let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
             let scatters = body.medium.albedo.max() > 0.0;
             scatters.then(|| Source::new(scene, body, &lights, options.photons, reach, options.seed)).flatten()
@@ -88,11 +91,10 @@ impl VolumePath {
         let sources = bodies.iter().map(source).collect();
         let diffuse =
             scene.objects.iter().any(|o| matches!(scene.materials[o.material].surface, Surface::Diffuse { .. }));
-        let persistence = match (lights.has_environment(), diffuse) {
-            (true, _) => 1.0,
-            (false, true) => 0.5,
-            (false, false) => 0.25,
-        };
+        let least: f32 = if diffuse { 0.5 } else { 0.25 };
+        // Of an environment, what is beside suns is met by paths that go on.
+        let beside = if lights.has_environment() { lights.share_beside_suns() } else { 0.0 };
+        let persistence = beside.sqrt().max(least);
         let light = DirectLight { lights, samples: 1 };
         Ok(Self { options, light, bodies, sources, persistence, camera_in: scene.camera_in(), once: false })
     }
@@ -158,6 +160,7 @@ impl VolumePath {
             other: 1.0,
             order: 0,
             meets_lamps: true,
+            by_cosine: None,
             left: None,
             radiance: Rgb::BLACK,
         }
@@ -258,6 +261,10 @@ impl Integrator for VolumePath {
         self.bodies.iter().zip(&self.sources).filter_map(of).sum()
     }
 
+    fn lights(&self, scene: &Scene) -> KnownLights {
+        KnownLights::met(scene, &self.light.lights)
+    }
+
     fn parts(&self, scene: &Scene) -> Vec<Part> {
         let mut parts = self.light.parts(scene);
         for (object, (body, source)) in scene.objects.iter().zip(self.bodies.iter().zip(&self.sources)) {
@@ -271,8 +278,9 @@ impl Integrator for VolumePath {
                     format!("photons in `{name}`"),
                     format!("{} a pass, joined to paths from the camera within {:.3} unit", source.count, source.reach),
                 ),
-                None if !self.light.lights.has_emitters() => {
-                    Part::left_out(format!("photons in `{name}`"), "no area light: paths meet all light by themselves")
+                None if !self.light.lights.has_emitters() && !self.light.lights.has_suns() => {
+                    let why = "no area light, no sun in a picture: paths meet all light by themselves";
+                    Part::left_out(format!("photons in `{name}`"), why)
                 }
                 None => Part::left_out(format!("photons in `{name}`"), "switched off, or nothing for them to do"),
             });

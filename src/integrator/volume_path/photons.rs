@@ -1,4 +1,4 @@
-//! Light traced from the lamps into a body: where it is scattered, for paths from the camera to connect to.
+//! Light traced from lamps and suns into a body: where it is scattered, for paths from the camera to connect to.
 
 use super::body::{Body, Edge, Watch};
 use super::cells::Cells;
@@ -40,6 +40,8 @@ pub struct Source {
     pub reach: f32,
     /// How far a connection's share yields to the walk's: see [`super::connect`].
     pub yielding: f32,
+    /// Share of the photons that come from suns.
+    pub from_suns: f32,
 }
 
 /// Photons that tell how many collisions a photon leaves.
@@ -50,6 +52,8 @@ const BYTES_PER_PHOTON: f64 = 2.5 * size_of::<Photon>() as f64;
 const CHUNK: u64 = 64;
 /// Photons of the estimate that sets [`Source::yielding`].
 const PILOT: u64 = 1024;
+/// Beside lamps, suns have at least this share of the photons, and at most all but this.
+const LEAST_SHARE: f32 = 0.05;
 
 impl Source {
     /// `None` where no lamp shines on the object. `count` photons a pass; `reach` [unit].
@@ -57,13 +61,29 @@ impl Source {
         let table = AreaTable::new(&scene.objects[body.object as usize].mesh)?;
         let seed = hash_combine(hash_combine(seed, 0x7068_6f74_6f6e), u64::from(body.object));
         let streams = Turn::seeds(seed).map(|seed| CacheStream::new(Points::Sobol, seed, 0));
-        let mut source = Self { table, streams, seed, count, reach, yielding: 0.0 };
+        let mut source = Self { table, streams, seed, count, reach, yielding: 0.0, from_suns: 0.0 };
         // Light that would arrive without anything in its way; by numbers that no photon uses, for shares of connections
         // that depended on the photons would not be fair.
         let pilot = CacheStream::new(Points::Sobol, seed, 1);
-        let arrivals = (0..PILOT).filter_map(|i| source.arrival(scene, body, lights, pilot.numbers(i)));
-        let flux = arrivals.map(|(_, _, flux)| flux.mean()).sum::<f32>() / PILOT as f32;
-        let per_photon = flux / (lights.mean_radiance() * count as f32);
+        let mut flux_if = |from_suns: f32| {
+            source.from_suns = from_suns;
+            let arrivals = (0..PILOT).filter_map(|i| source.arrival(scene, body, lights, pilot.numbers(i)));
+            arrivals.map(|(_, _, flux)| flux.mean()).sum::<f32>() / PILOT as f32
+        };
+        let flux = [
+            if lights.has_emitters() { flux_if(0.0) } else { 0.0 },
+            if lights.has_suns() { flux_if(1.0) } else { 0.0 },
+        ];
+        source.from_suns = match (lights.has_emitters(), lights.has_suns()) {
+            (_, false) => 0.0,
+            (false, true) => 1.0,
+            (true, true) => {
+                (flux[1] / (flux[0] + flux[1]).max(f32::MIN_POSITIVE)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE)
+            }
+        };
+        // Radiance that brings the flux: of two kinds of light the mean of what each alone would have.
+        let per = |flux: f32, radiance: f32| if flux > 0.0 { flux / (radiance * count as f32) } else { 0.0 };
+        let per_photon = per(flux[0], lights.mean_radiance()) + per(flux[1], lights.radiance_of_suns());
         source.yielding = YIELD * per_photon / (4.0 * PI * body.eta * body.eta);
         (source.yielding.is_normal()).then_some(source)
     }
@@ -130,8 +150,15 @@ impl Source {
         let at = self.table.sample(pick, [u[0], u[1]]);
         let mut point = scene.objects[body.object as usize].mesh.point(at.triangle, at.u, at.v);
         point.n = point.n_geometric;
-        let arrival = lights.sample_emitter(scene, &point, [u[2], u[3], u[4]])?;
-        let entering = transmittance(body.eta, arrival.w.dot(point.n)) * self.table.area() as f32;
+        // The number that picks suns or lamps, spread out again, picks one of them.
+        let (arrival, share) = if u[2] < self.from_suns {
+            let pick = u[2] / self.from_suns;
+            (lights.sample_sun(&point, [pick, u[3], u[4]])?, self.from_suns)
+        } else {
+            let pick = (u[2] - self.from_suns) / (1.0 - self.from_suns);
+            (lights.sample_emitter(scene, &point, [pick, u[3], u[4]])?, 1.0 - self.from_suns)
+        };
+        let entering = transmittance(body.eta, arrival.w.dot(point.n)) * self.table.area() as f32 / share;
         Some((point, arrival, arrival.irradiance * entering))
     }
 
@@ -151,7 +178,11 @@ impl Source {
             return;
         }
         rays.shadow += 1;
-        if view.rays.occluded(&arrival.shadow) {
+        let open = !view.rays.occluded(&arrival.shadow);
+        if let Some(light) = arrival.light {
+            rays.lights.ask(light, open);
+        }
+        if !open {
             return;
         }
         let key = hash_combine(turn.seed, number);

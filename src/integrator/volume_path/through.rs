@@ -1,18 +1,18 @@
-//! Light from a lamp straight to a collision, through every facet of the boundary that refracts it there.
+//! Light from a lamp or a sun straight to a collision, through every facet of the boundary that refracts it there.
 
 use super::body::{Body, Straight};
 use super::draws::Draws;
-use super::facets::{Crossing, Facets};
+use super::facets::{Bend, Crossing, Facets, Towards};
 use super::spectrum::Spectrum;
-use crate::integrator::{View, WalkTally};
-use crate::light::{LampPoint, Lights};
+use crate::integrator::{Tally, View, WalkTally};
+use crate::light::{LampPoint, Lights, SunDirection};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::transmittance;
 use crate::query::{Hit, Ray};
 use crate::scene::Scene;
 use std::f32::consts::PI;
 
-/// What a body needs to be asked for the light of lamps.
+/// What a body needs to be asked for the light of lamps and suns.
 pub struct Through {
     facets: Facets,
     /// For each object whether it is a lamp whose light is found from points of it alone; a path that meets it by chance,
@@ -20,6 +20,8 @@ pub struct Through {
     alone: Vec<bool>,
     /// Whether that holds for all lamps.
     pub all_alone: bool,
+    /// Directions of suns with a density [1/sr] above this are such lamps too.
+    alone_above: f32,
 }
 
 /// Crossings whose light may be looked for at one collision; of more, as many are drawn by what they carry.
@@ -30,9 +32,10 @@ const SURE: f32 = 1.0;
 const ALONE_BELOW: f32 = 0.25;
 
 impl Through {
-    /// For the object number `object` with refractive index `eta` and mean cosine `g`. `None` without lamps or facets.
+    /// For the object number `object` with refractive index `eta` and mean cosine `g`. `None` without facets, or without lamps
+    /// and suns.
     pub fn new(scene: &Scene, lights: &Lights, object: u32, eta: f32, g: f32) -> Option<Self> {
-        if !lights.has_emitters() {
+        if !lights.has_emitters() && !lights.has_suns() {
             return None;
         }
         let mesh = &scene.objects[object as usize].mesh;
@@ -48,17 +51,52 @@ impl Through {
         let is_lamp = |i: u32| lights.pdf_area(i) > 0.0;
         let alone: Vec<bool> = (0..scene.objects.len() as u32).map(|i| is_lamp(i) && is_alone(i)).collect();
         let all_alone = (0..alone.len() as u32).all(|i| alone[i as usize] || !is_lamp(i));
-        Some(Self { facets: Facets::new(mesh, eta)?, alone, all_alone })
+        let alone_above = phase / (ALONE_BELOW * (eta * eta).min(1.0));
+        Some(Self { facets: Facets::new(mesh, eta)?, alone, all_alone, alone_above })
     }
 
     /// Whether light of the object number `object` is left to [`lamp_light`] alone.
     pub fn alone(&self, object: u32) -> bool {
         self.alone[object as usize]
     }
+
+    /// Whether light of a sun that is drawn with density `pdf` [1/sr] is left to [`sun_light`] alone.
+    pub fn sun_alone(&self, pdf: f32) -> bool {
+        pdf > self.alone_above
+    }
+}
+
+/// What is asked for its light.
+enum Asked {
+    Lamp(LampPoint),
+    Sun(SunDirection),
+}
+
+impl Asked {
+    fn radiance(&self) -> Rgb {
+        match self {
+            Self::Lamp(lamp) => lamp.radiance,
+            Self::Sun(sun) => sun.radiance,
+        }
+    }
+
+    fn light(&self) -> usize {
+        match self {
+            Self::Lamp(lamp) => lamp.light,
+            Self::Sun(_) => Lights::SUNS,
+        }
+    }
+
+    fn place(&self) -> Towards {
+        match self {
+            Self::Lamp(lamp) => Towards::Point(lamp.at.x),
+            Self::Sun(sun) => Towards::Direction(sun.w),
+        }
+    }
 }
 
 /// Densities of one line from a collision to a point of a lamp, per area of the lamp: by a point drawn on the lamp, and by a
-/// direction drawn from the phase function and let through. The balance heuristic [VG95] shares the light among both:
+/// direction drawn from the phase function and let through; for a sun, per solid angle outside. The balance heuristic [VG95] shares the light among both:
 /// no line carries more than the lamp's radiance.
 struct Densities {
     by_point: f32,
@@ -69,6 +107,15 @@ impl Densities {
     fn share_by_point(&self) -> f32 {
         self.by_point / (self.by_point + self.by_chance)
     }
+
+    fn share_by_chance(&self) -> f32 {
+        self.by_chance / (self.by_point + self.by_chance)
+    }
+}
+
+/// Density of a direction outside [1/sr] by one drawn inside with density `phase` and let through.
+fn density_outside(body: &Body, bend: &Bend, phase: f32) -> f32 {
+    phase * transmittance(1.0 / body.eta, bend.cosines[0] as f32) * bend.focus_of_directions(body.eta.into()) as f32
 }
 
 /// Radiance that lamps send straight to the collision at `x`, through the boundary, scattered there against `w`, in which
@@ -84,26 +131,63 @@ pub fn lamp_light(
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
     draws: &mut Draws,
-    tally: &mut WalkTally,
+    tally: &mut Tally,
+) -> Rgb {
+    let u = [draws.number(), draws.number(), draws.number()];
+    let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
+    let Some(lamp) = lights.point(view.scene, u) else { return Rgb::BLACK };
+    let alone = body.through.as_ref().is_some_and(|t| t.alone(lamp.object));
+    let asked = (Asked::Lamp(lamp), alone);
+    spectrum.value(&body.medium) * arriving(view, body, &asked, (x, w), horizon, found, draws, tally)
+}
+
+/// As [`lamp_light`] for suns: a direction is drawn, and all facets that refract light from there to `x` are found.
+pub fn sun_light(
+    view: View<'_>,
+    (body, lights): (&Body, &Lights),
+    (x, w): (DVec3, Vec3),
+    spectrum: &Spectrum,
+    found: &mut Vec<Crossing>,
+    draws: &mut Draws,
+    tally: &mut Tally,
+) -> Rgb {
+    let u = [draws.number(), draws.number(), draws.number()];
+    let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
+    let Some(sun) = lights.sun(u) else { return Rgb::BLACK };
+    let alone = body.through.as_ref().is_some_and(|t| t.sun_alone(sun.pdf_angle));
+    let asked = (Asked::Sun(sun), alone);
+    spectrum.value(&body.medium) * arriving(view, body, &asked, (x, w), horizon, found, draws, tally)
+}
+
+/// How far away facets are looked for; `None` where no surface is that near.
+fn horizon(body: &Body, x: DVec3, draws: &mut Draws) -> Option<f32> {
+    let horizon = (SURE - (1.0 - draws.number()).ln()) / body.least_extinction;
+    (body.clearance.at(x) <= horizon).then_some(horizon)
+}
+
+/// What arrives at `x` from the place that is asked, and whether that is left to points alone; per unit weight of the path.
+#[allow(clippy::too_many_arguments)] // what both callers have
+fn arriving(
+    view: View<'_>,
+    body: &Body,
+    (asked, alone): &(Asked, bool),
+    (x, w): (DVec3, Vec3),
+    horizon: f32,
+    found: &mut Vec<Crossing>,
+    draws: &mut Draws,
+    tally: &mut Tally,
 ) -> Rgb {
     let Some(through) = &body.through else { return Rgb::BLACK };
-    let u = [draws.number(), draws.number(), draws.number()];
     let decay = body.least_extinction;
-    let horizon = (SURE - (1.0 - draws.number()).ln()) / decay;
-    if body.clearance.at(x) > horizon {
-        return Rgb::BLACK;
-    }
-    let Some(lamp) = lights.point(view.scene, u) else { return Rgb::BLACK };
     let mesh = &view.scene.objects[body.object as usize].mesh;
-    through.facets.crossings(mesh, x, lamp.at.x, horizon, found);
-    let alone = through.alone(lamp.object);
+    through.facets.crossings(mesh, x, asked.place(), horizon, found);
     let mut sum = 0.0;
     let carried = |crossing: &Crossing| {
-        let light = line(body, crossing, &lamp, body.phase(w, crossing.inside), alone);
+        let light = line(body, crossing, asked, body.phase(w, crossing.inside), *alone);
         let length = crossing.bend.lengths[0] as f32;
         // Over the chance that the horizon is not nearer.
         let weighted = decay * (length - SURE / decay).max(0.0);
-        lamp.radiance * body.medium.sigma_t.map(|s| (weighted - s * length).exp()) * light
+        asked.radiance() * body.medium.sigma_t.map(|s| (weighted - s * length).exp()) * light
     };
     found.retain(|crossing| {
         let light = carried(crossing).mean();
@@ -112,7 +196,7 @@ pub fn lamp_light(
     });
     let mut light = Rgb::BLACK;
     if found.len() <= MOST_TRACED {
-        for crossing in found.iter().filter(|c| open(view, body, x, c, &lamp, tally)) {
+        for crossing in found.iter().filter(|c| open(view, body, x, c, asked, tally)) {
             light += carried(crossing);
         }
     } else {
@@ -126,36 +210,53 @@ pub fn lamp_light(
             while mark < below {
                 (mark, marks) = (mark + step, marks + 1.0);
             }
-            if marks > 0.0 && open(view, body, x, crossing, &lamp, tally) {
+            if marks > 0.0 && open(view, body, x, crossing, asked, tally) {
                 light += carried * (marks * step / carried.mean());
             }
         }
     }
-    spectrum.value(&body.medium) * light
+    light
 }
 
-/// What arrives of the lamp's radiance over one line, over the density of the lamp's point; without absorption.
-fn line(body: &Body, crossing: &Crossing, lamp: &LampPoint, phase: f32, alone: bool) -> f32 {
-    let cosine = lamp.cosine(crossing.outside);
-    if cosine <= 0.0 {
-        return 0.0;
-    }
-    let passed = transmittance(1.0 / body.eta, crossing.bend.cosines[0] as f32);
-    let by_chance = phase * passed * cosine * crossing.bend.focus(body.eta.into()) as f32;
-    let densities = Densities { by_point: lamp.pdf_area, by_chance };
-    by_chance / lamp.pdf_area * if alone { 1.0 } else { densities.share_by_point() }
+/// What arrives of the radiance over one line, over the density of what was drawn; without absorption.
+fn line(body: &Body, crossing: &Crossing, asked: &Asked, phase: f32, alone: bool) -> f32 {
+    let densities = match asked {
+        Asked::Lamp(lamp) => {
+            let cosine = lamp.cosine(crossing.outside);
+            if cosine <= 0.0 {
+                return 0.0;
+            }
+            let passed = transmittance(1.0 / body.eta, crossing.bend.cosines[0] as f32);
+            let by_chance = phase * passed * cosine * crossing.bend.focus(body.eta.into()) as f32;
+            Densities { by_point: lamp.pdf_area, by_chance }
+        }
+        Asked::Sun(sun) => {
+            Densities { by_point: sun.pdf_angle, by_chance: density_outside(body, &crossing.bend, phase) }
+        }
+    };
+    densities.by_chance / densities.by_point * if alone { 1.0 } else { densities.share_by_point() }
 }
 
-/// Whether nothing stands between `x` and the lamp.
-fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, lamp: &LampPoint, tally: &mut WalkTally) -> bool {
+/// Whether nothing stands between `x` and what is asked.
+fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &Asked, tally: &mut Tally) -> bool {
+    let open = is_open(view, body, x, crossing, asked, &mut tally.walk);
+    tally.rays.lights.ask(asked.light(), open);
+    open
+}
+
+fn is_open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &Asked, tally: &mut WalkTally) -> bool {
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     tally.rays += 1;
     if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
         return false;
     }
     tally.rays += 1;
-    let (from, to) = (at.leave(crossing.outside), lamp.at.arrive(crossing.outside, at.x, at.error));
-    !view.rays.occluded(&Ray::between(from, to))
+    let from = at.leave(crossing.outside);
+    let outside = match asked {
+        Asked::Lamp(lamp) => Ray::between(from, lamp.at.arrive(crossing.outside, at.x, at.error)),
+        Asked::Sun(sun) => Ray::new(from, sun.w),
+    };
+    !view.rays.occluded(&outside)
 }
 
 /// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
@@ -176,8 +277,17 @@ pub fn share_by_chance(
     let normal = scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
     let focus = bend.focus(body.eta.into()) as f32 * normal.dot(direction).abs();
     let passed = transmittance(1.0 / body.eta, bend.cosines[0] as f32);
-    let densities = Densities { by_point: lights.pdf_area(hit.mesh), by_chance: straight.phase * passed * focus };
-    densities.by_chance / (densities.by_point + densities.by_chance)
+    Densities { by_point: lights.pdf_area(hit.mesh), by_chance: straight.phase * passed * focus }.share_by_chance()
+}
+
+/// The same for a sun, drawn with density `by_point` [1/sr], and [`sun_light`].
+pub fn sun_share_by_chance(body: &Body, straight: &Straight, by_point: f32) -> f32 {
+    let Some(through) = &body.through else { return 1.0 };
+    if through.sun_alone(by_point) {
+        return 0.0;
+    }
+    let by_chance = density_outside(body, &straight.bend(f32::INFINITY), straight.phase);
+    Densities { by_point, by_chance }.share_by_chance()
 }
 
 #[cfg(test)]
@@ -228,7 +338,7 @@ mod tests {
         let method = VolumePath::new(&scene, OPTIONS).unwrap();
         let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
         let (mut points, mut chance) = (Mean::default(), Mean::default());
-        let (mut found, mut tally) = (Vec::new(), WalkTally::default());
+        let (mut found, mut tally) = (Vec::new(), Tally::default());
         for i in 0..samples {
             let mut draws = Draws::new(&[], i);
             // Somewhere in the ball, more often close to its surface.
@@ -237,7 +347,7 @@ mod tests {
             let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
             let mut lucky = [0.0; 2];
             let to = body.scatter(w, &mut draws);
-            if let Flight::Boundary(at, length) = body.flight(view, x, to, f32::INFINITY, &mut tally)
+            if let Flight::Boundary(at, length) = body.flight(view, x, to, f32::INFINITY, &mut tally.walk)
                 && let Some(out) = refract(-to, -at.n_geometric, 1.0 / body.eta)
                 && let Some(hit) = view.rays.closest(&Ray::new(at.leave(out), out))
             {
@@ -298,7 +408,7 @@ mod tests {
             let view = View { scene: &scene, rays: &*rays };
             let method = VolumePath::new(&scene, OPTIONS).unwrap();
             let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
-            let (mut found, mut tally, mut most) = (Vec::new(), WalkTally::default(), 0.0_f32);
+            let (mut found, mut tally, mut most) = (Vec::new(), Tally::default(), 0.0_f32);
             for i in 0..100_000 {
                 let mut draws = Draws::new(&[], i);
                 let x = draws.direction().as_dvec3() * 0.98 - scene.centre;
