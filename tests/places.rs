@@ -5,7 +5,8 @@
 use marmor::film::{Film, Window};
 use marmor::geometry::Precision;
 use marmor::integrator::{View, VolumePath, VolumePathOptions, WalkTally};
-use marmor::math::{Rgb, Vec3, hash};
+use marmor::light::Lights;
+use marmor::math::{Rgb, Vec3, hash, unit_f32};
 use marmor::query::{self, Backend, Ray};
 use marmor::render::{self, Job};
 use marmor::scene::{Orders, Scene, SceneFile};
@@ -293,6 +294,44 @@ fn a_lamp_far_away_does_not_coarsen_a_body() {
         for c in 0..3 {
             // The same random numbers meet the same lamp as seen from the ball: they differ by its parallax, 0.2 %.
             assert!((far[c] / near[c] - 1.0).abs() < 0.02, "{}: {near:?} {far:?}", backend.name());
+        }
+    }
+}
+
+/// A lamp whose coordinates are tiny where those of what it lights are not: no shadow ray may end in the lamp itself.
+#[test]
+fn a_small_lamp_in_the_middle_of_a_wide_scene_does_not_shade_itself() {
+    let plane = |y: f64, edge: f64, material: &str| {
+        format!(
+            "[[object]]\nshape = \"rectangle\"\ncentre = [0, {y}, 0]\nedge_u = [0, {}, {edge}]\nedge_v = [{edge}, 0, 0]\n\
+             material = \"{material}\"\n",
+            if y == 0.0 { 0.3 * edge } else { 0.0 }
+        )
+    };
+    let text = format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 4, 9]\nlook_at = [0, 0, 0]\nfov = 15\nresolution = [8, 8]\n{}{}{}\
+         [material.grey]\ntype = \"diffuse\"\nalbedo = 0.5\n[material.lamp]\ntype = \"emissive\"\nradiance = 1\ntwo_sided = true\n",
+        plane(-5.0, 100.0, "grey"),
+        plane(5.0, 100.0, "grey"),
+        plane(0.0, 0.02, "lamp")
+    );
+    let mut scene = Scene::load(&SceneFile::parse(&text, Path::new("scene.toml")).unwrap()).unwrap();
+    assert_eq!(scene.why_double, None);
+    for precision in [Precision::Single, Precision::Double] {
+        scene.objects.iter_mut().for_each(|o| o.mesh.precision = precision);
+        let lights = Lights::new(&scene);
+        for backend in backends() {
+            let rays = query::build(backend, &scene.meshes()).unwrap();
+            let mut asked = 0;
+            for i in 0..20_000_u64 {
+                let u = |k: u64| unit_f32((hash(5 * i + k + 1) >> 32) as u32);
+                let at = scene.objects[0].mesh.point((i % 2) as u32, u(0).into(), (u(1) * (1.0 - u(0))).into());
+                let at = at.facing(Vec3::Y);
+                let Some(arrival) = lights.sample_emitter(&scene, &at, [u(2), u(3), u(4)]) else { continue };
+                asked += 1;
+                assert!(!rays.occluded(&arrival.shadow), "{precision:?} on {}: {:?}", backend.name(), arrival.shadow);
+            }
+            assert!(asked > 10_000);
         }
     }
 }

@@ -11,8 +11,9 @@ use rayon::prelude::*;
 /// The start of a ray may be off by this share of a body's thickness. On the slab of van de Hulst its reflectance falls by 1.5
 /// times that: see docs/rays.md.
 const THIN: f64 = 5e-4;
-/// And by this share of the shortest transport mean free path, where paths are followed in a medium.
-const DENSE: f64 = 5e-3;
+/// And by this share of the shortest transport mean free path, where paths are followed in a medium; by the share above of the
+/// length over which light falls by 1/e, on which half spaces' reflectance depends.
+const DENSE: f64 = 0.05;
 /// From another surface it may be off by this share of a body's thickness: that is seen where they touch, if at all.
 const CONTACT: f64 = 0.05;
 /// Share of a body's area that may be thinner.
@@ -63,7 +64,11 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         let (other, farthest) = worst.iter().find(|w| w.0 != number).copied().unwrap_or((number, 0.0));
         let Some(probes) = probes(object, farthest / CONTACT) else { continue };
         let name = &object.name;
-        let path = if walks(t) { 1.0 / f64::from(t.medium.sigma_t_prime().max()) } else { f64::INFINITY };
+        let (absorbed, sigma) = (t.medium.sigma_a, t.medium.sigma_t_prime());
+        let path = 1.0 / f64::from(sigma.max());
+        let decay = (0..3).map(|c| (3.0 * f64::from(absorbed[c]) * f64::from(sigma[c])).sqrt()).fold(0.0, f64::max);
+        let limit = if walks(t) { (DENSE * path).min(THIN / decay) } else { f64::INFINITY };
+        let medium = || format!("{path:.3e} units, and light falls by 1/e over {:.3e}", 1.0 / decay);
         let why = if let Some((share, thickness)) = thinner(&probes, |p| p.offset / THIN) {
             Some(format!(
                 "object {name:?} is {thickness:.3e} units thick on {share:.0} % of its surface, from which rays in single \
@@ -76,10 +81,11 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
                  start {farthest:.1e} units away from object {:?}",
                 objects[other].name
             ))
-        } else if offsets[number] > DENSE * path {
+        } else if offsets[number] > limit {
             Some(format!(
-                "the transport mean free path in object {name:?} is {path:.3e} units; rays in single precision start {:.1e} \
-                 units away from its surface",
+                "the transport mean free path in object {name:?} is {}; rays in single precision start {:.1e} units away from its \
+                 surface",
+                medium(),
                 offsets[number]
             ))
         } else {
@@ -94,13 +100,14 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
                      double precision: rays start {offset:.1e} units away from it, and light goes astray; make it thicker or smaller"
                 ),
             ));
-        } else if offsets[number] * DOUBLE > BEYOND * path {
+        } else if offsets[number] * DOUBLE > limit * BEYOND / THIN {
             let offset = offsets[number] * DOUBLE;
             choice.beyond.push((
                 number,
                 format!(
-                    "the transport mean free path, {path:.1e} units, is too short for its size even in double precision: rays \
-                     start {offset:.1e} units away from it; paths inside it are wrong"
+                    "the transport mean free path is {}: too short for its size even in double precision, in which rays start \
+                     {offset:.1e} units away from it; paths inside it are wrong",
+                    medium()
                 ),
             ));
         }
