@@ -1,6 +1,7 @@
 //! How wrong each model is on plane half spaces, slabs and balls: a pencil beam enters along the normal, and what comes
 //! out is compared with paths through the medium, ring by ring. Prints the table `src/bssrdf/expected.csv`; docs/models.md has
-//! the method. `MARMOR_BENCH_PATHS` (100000) sets the paths a shape, `MARMOR_BENCH_ONLY` picks rows by their first words.
+//! the method. `MARMOR_BENCH_PATHS` (100000) sets the paths a shape, `MARMOR_BENCH_ONLY` picks rows by their first words,
+//! `MARMOR_BENCH_ALBEDO` by their reduced albedo.
 #![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)] // a bench that cannot run says so by stopping
 
 #[path = "../tests/support/pencils.rs"]
@@ -24,10 +25,12 @@ fn ring_end(i: usize) -> f64 {
     if i + 1 == RINGS { 1e4 } else { 0.1 * 10f64.powf(i as f64 / 6.0) }
 }
 
-/// Reduced albedos; with g = 0 all come from the same paths.
+/// Reduced albedos; with g = 0 all but [`HIGHEST`] come from the same paths.
 const ALBEDOS: [f64; 9] = [0.3, 0.5, 0.6, 0.7, 0.8, 0.9, 0.97, 0.99, 0.999];
 /// The albedo of these paths.
 const TRACED: f64 = 0.9993;
+/// Milk and cream. Its light is scattered so often that paths of another albedo tell little of it.
+const HIGHEST: f64 = 0.9999;
 /// Thicknesses of slabs and radii of balls [transport mean free paths].
 const SIZES: [f32; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
 
@@ -191,6 +194,8 @@ fn main() {
     let set = |name: &str| std::env::var(name).ok();
     let paths: u64 = set("MARMOR_BENCH_PATHS").and_then(|n| n.parse().ok()).unwrap_or(100_000);
     let only = set("MARMOR_BENCH_ONLY").unwrap_or_default();
+    let albedo = set("MARMOR_BENCH_ALBEDO").and_then(|a| a.parse::<f64>().ok());
+    let wanted = |a: f64| albedo.is_none_or(|asked| asked == a);
     let mut shapes = vec![("half", 0.0, Shape::Slab { thickness: 400.0, half_width: 400.0 })];
     shapes.extend(SIZES.map(|h| ("slab", h, Shape::Slab { thickness: h, half_width: 400.0 })));
     shapes.extend(SIZES.map(|r| ("ball", r, Shape::Ball { radius: r })));
@@ -210,19 +215,19 @@ fn main() {
                 continue;
             }
             let seed = size as u64 * 100 + (eta * 10.0) as u64;
-            if g == 0.0 {
+            if g == 0.0 && albedo != Some(HIGHEST) {
                 let factors = ALBEDOS.map(|a| a / TRACED);
                 let truths = trace(shape, medium(TRACED, g, eta), &factors, paths, seed);
-                for (albedo, truth) in ALBEDOS.iter().zip(&truths) {
+                for (albedo, truth) in ALBEDOS.iter().zip(&truths).filter(|(a, _)| wanted(**a)) {
                     report(&format!("{head},{albedo}"), shape, &medium(*albedo, g, eta), truth, paths as f64);
                 }
-            } else {
-                for alpha_prime in [0.5, 0.7, 0.9, 0.97, 0.99, 0.999] {
-                    // α′ = α (1 - g) / (1 - α g).
-                    let medium = medium(alpha_prime / (1.0 - g + alpha_prime * g), g, eta);
-                    let truth = trace(shape, medium, &[1.0], paths / 2, seed);
-                    report(&format!("{head},{alpha_prime}"), shape, &medium, &truth[0], (paths / 2) as f64);
-                }
+            }
+            let own_paths: &[f64] = if g == 0.0 { &[HIGHEST] } else { &[0.5, 0.7, 0.9, 0.97, 0.99, 0.999, HIGHEST] };
+            for &alpha_prime in own_paths.iter().filter(|a| wanted(**a)) {
+                // α′ = α (1 - g) / (1 - α g).
+                let medium = medium(alpha_prime / (1.0 - g + alpha_prime * g), g, eta);
+                let truth = trace(shape, medium, &[1.0], paths / 2, seed);
+                report(&format!("{head},{alpha_prime}"), shape, &medium, &truth[0], (paths / 2) as f64);
             }
         }
     }

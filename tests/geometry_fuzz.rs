@@ -212,7 +212,7 @@ fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
 /// A scene and what its bodies are to each other.
 fn scene(number: u64) -> (Scene, Vec<Placed>) {
     let mut dice = Dice(number << 20);
-    let mut bodies = vec![body(&mut dice, number % 2 == 0)];
+    let mut bodies = vec![body(&mut dice, number.is_multiple_of(2))];
     let mut placed = Vec::new();
     let count = 1 + dice.below(3);
     let mut meshes = vec![vec![0_usize]];

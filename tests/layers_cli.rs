@@ -168,19 +168,38 @@ fn check_says_which_model_to_trust() {
     // The ball of 4 transport mean free paths: `beam` 8 %, `standard` a third.
     let folder = folder("standard");
     let text = told(&marmor(folder.path(), "check scene.toml"));
-    assert!(text.contains("which model to trust") && text.contains("ball (wax): reduced albedo 0.999"), "{text}");
-    assert!(text.contains("8.0 to 8.0 transport mean free paths thick (median 8.0)"), "{text}");
-    assert!(text.contains("`standard` 34 % (chosen)") && text.contains("trust `beam`"), "{text}");
+    assert!(text.contains("which model to trust") && text.contains("ball (material wax):"), "{text}");
+    assert!(text.contains("8 to 8 transport mean free paths thick, median 8; reduced albedo 0.9990"), "{text}");
+    assert!(text.contains("`standard` (chosen): expected error 34 %") && text.contains("--model beam"), "{text}");
     let json: serde_json::Value =
         serde_json::from_slice(&marmor(folder.path(), "check scene.toml --json").stdout).unwrap();
     let models = json["validity"][0]["models"].as_array().unwrap();
     assert_eq!(models[0]["model"], "beam");
     assert!((models[0]["distribution"].as_f64().unwrap() - 0.079).abs() < 0.01, "{json:#}");
+    // Mean curvature from heights around each place: 1/4 in transport mean free paths.
+    assert!((json["validity"][0]["curvature"][1].as_f64().unwrap() - 0.25).abs() < 0.01, "{json:#}");
     // Held to less, it is trusted nowhere.
     let strict = told(&marmor(folder.path(), "check scene.toml --tolerance 0.02"));
-    assert!(strict.contains("trust none") && strict.contains("--method volume_path"), "{strict}");
+    assert!(strict.contains("no model is right in this medium") && strict.contains("--method volume_path"), "{strict}");
     // Nothing is said where nothing is translucent.
     let opaque = scene("standard").replace("material = \"wax\"", "material = \"grey\"");
     fs::write(folder.path().join("opaque.toml"), opaque).unwrap();
     assert!(!told(&marmor(folder.path(), "check opaque.toml")).contains("which model"));
+}
+
+#[test]
+fn the_validity_layer_has_no_number_where_none_was_measured() {
+    let folder = folder("beam");
+    // A medium beyond the table, and an open sheet in place of the floor.
+    let render = "render scene.toml -q --spp 1 -o x.exr --layers validity";
+    assert!(marmor(folder.path(), &format!("{render} -D material.wax.sigma_a=0")).status.success());
+    let c = channels(&folder.path().join("x.exr"));
+    let middle = at(12, 12);
+    assert!(c["validity.Y"][middle].is_nan() && (c["validity.thickness"][middle] - 8.0).abs() < 0.1);
+    assert_eq!(c["validity.Y"][at(0, 0)], 0.0, "nothing is there");
+    assert!(marmor(folder.path(), &format!("{render} -D object.1.material=wax")).status.success());
+    let c = channels(&folder.path().join("x.exr"));
+    let below = at(12, 23);
+    assert!(c["validity.Y"][below].is_nan() && c["validity.thickness"][below].is_nan());
+    assert!(c["validity.Y"][middle] < 0.2);
 }

@@ -46,7 +46,7 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
             return Choice { name: ModelName::Slab, why, trusted };
         }
         if relative <= LEAST_THICKNESS {
-            let why = format!("{relative:.2} transport mean free paths thick, below 2: trace paths to be sure");
+            let why = format!("{relative:.2} transport mean free paths thick, below 2: no model is near");
             return Choice { name: ModelName::Beam, why, trusted: false };
         }
     }
@@ -55,7 +55,7 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
     let verdict = match trust {
         Trust::Diffusion | Trust::WithSingleScattering => "the nearest model to transport",
         Trust::Marginal => "the nearest model to transport, marginal here",
-        Trust::PathTracing => "outside diffusion theory: trace paths to be sure",
+        Trust::PathTracing => "outside diffusion theory: no model is near",
     };
     // Photon beam diffusion with single scattering is first wherever the chart trusts any; where it trusts none, too.
     Choice { name: ModelName::Beam, why: format!("{numbers}: {verdict}"), trusted }
@@ -75,7 +75,7 @@ mod tests {
         let milk = choose(&medium(2.55, 0.0011, 0.0), None);
         assert!(milk.trusted && milk.name == ModelName::Beam, "{milk:?}");
         let dark = choose(&medium(0.07, 0.97, 0.0), None);
-        assert!(!dark.trusted && dark.why.contains("trace paths"), "{dark:?}");
+        assert!(!dark.trusted && dark.why.contains("no model is near"), "{dark:?}");
         let forward = choose(&medium(20.0, 2.0, 0.95), None);
         assert!(!forward.trusted && forward.why.contains("g 0.950"), "{forward:?}");
         let slab = choose(&medium(2.55, 0.0011, 0.0), Some(4.0));

@@ -3,6 +3,7 @@
 
 use super::ModelName;
 use crate::optics::ChannelOptics;
+use serde::Serialize;
 use std::sync::OnceLock;
 
 /// Errors of a model at a place, relative to all light that leaves after a narrow beam has entered there.
@@ -27,7 +28,8 @@ pub struct Place {
     pub g: f64,
     /// n_inside / n_outside.
     pub eta: f64,
-    /// Way along the inward normal to the other side [transport mean free paths]; may be infinite.
+    /// Way along the inward normal to the other side [transport mean free paths]; infinite in a half space, NaN where there
+    /// is no other side.
     pub thickness: f64,
     /// Mean curvature [1 / transport mean free path]: 1 / radius on a ball, 0 on a plane, below 0 in a hollow.
     pub curvature: f64,
@@ -43,6 +45,26 @@ impl Place {
             eta,
             thickness: thickness / path,
             curvature: curvature * path,
+        }
+    }
+
+    /// The nearest place that the table has, of the same shape; itself where it has been measured.
+    /// What is thinner or clearer errs by more.
+    pub fn nearest_measured(self) -> Self {
+        let g = self.g.clamp(0.0, FORWARD.1);
+        let [low, high] = measured_albedos(g);
+        let thickness = if self.thickness < SIZES[0] { SIZES[0] } else { self.thickness };
+        Self {
+            alpha_prime: self.alpha_prime.clamp(low, high),
+            g,
+            eta: self.eta.clamp(ETAS[0], ETAS[2]),
+            thickness,
+            // A ball stays a ball.
+            curvature: if thickness == self.thickness {
+                self.curvature
+            } else {
+                self.curvature * self.thickness / thickness
+            },
         }
     }
 }
@@ -65,7 +87,25 @@ const ETAS: [f64; 3] = [1.0, 1.3, 1.5];
 /// The index and the mean cosine of the other rows.
 const FORWARD: (f64, f64) = (1.3, 0.8);
 
-/// The error of `model` (of `auto` that of `beam`) at `place`; `calibrated` is about `directional` alone.
+/// Why there is no figure.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unmeasured {
+    /// The model, here: `auto` before it has chosen, a slab of another thickness or too thin for one.
+    Model,
+    /// Reduced albedo beyond [`measured_albedos`].
+    Albedo,
+    /// n_inside / n_outside beyond 1 to 1.5.
+    Index,
+    /// Mean cosine beyond 0 to 0.8.
+    Cosine,
+    /// Thinner than 1 transport mean free path: any model of a body is further from the truth than in the table.
+    Thin,
+    /// No other side: a sheet, a hole, faces that look inwards.
+    Open,
+}
+
+/// The error of `model` at `place`, where it has been measured; `calibrated` is about `directional` alone.
 ///
 /// The table has slabs of thickness H, balls of radius R and the half space. A place of thickness H and mean curvature
 /// 1/R is read as
@@ -75,21 +115,31 @@ const FORWARD: (f64, f64) = (1.3, 0.8);
 ///
 /// so that a ball gives the row of its ball, a sheet that of its slab, a plane that of the half space, and what is between
 /// them lies between. Hollows count as flat. Between rows: linear in ln(1 - α′), in ln(size) up to 50 transport mean free
-/// paths and in 1/size beyond, in η and in g. Outside of α′ 0.3 .. 0.999, η 1 .. 1.5, g 0 .. 0.95 and below a size
-/// of 1 the nearest end counts.
-pub fn expected_error(model: ModelName, calibrated: bool, place: &Place) -> ExpectedError {
-    let model = if model == ModelName::Auto { ModelName::Beam } else { model };
+/// paths and in 1/size beyond, in η and in g. A ball of a radius below 1 counts as one of 1.
+///
+/// # Errors
+/// Where nothing has been measured.
+pub fn expected_error(
+    model: ModelName,
+    calibrated: bool,
+    place: &Place,
+) -> std::result::Result<ExpectedError, Unmeasured> {
     let calibrated = calibrated && model == ModelName::Directional;
-    let column = MODELS.iter().position(|m| *m == (model, calibrated)).unwrap_or(0);
-    let table = table();
-    let g = if place.g.is_finite() { place.g.clamp(0.0, 0.95) } else { 0.0 };
-    let eta = place.eta.clamp(ETAS[0], ETAS[ETAS.len() - 1]);
+    let column = MODELS.iter().position(|m| *m == (model, calibrated)).ok_or(Unmeasured::Model)?;
+    if !(ETAS[0] - SLACK..=ETAS[2] + SLACK).contains(&place.eta) {
+        return Err(Unmeasured::Index);
+    }
+    if !(-SLACK..=FORWARD.1 + SLACK).contains(&place.g) {
+        return Err(Unmeasured::Cosine);
+    }
+    let (table, g) = (table(), place.g.max(0.0));
+    let eta = place.eta.clamp(ETAS[0], ETAS[2]);
     let i = if eta < ETAS[1] { 0 } else { 1 };
     let at = (eta - ETAS[i]) / (ETAS[i + 1] - ETAS[i]);
     let read = |medium: usize| table.media[medium].shape(column, place);
-    let mut error = mix(read(i), read(i + 1), at);
+    let mut error = if at > 0.0 { mix(read(i), read(i + 1), at) } else { read(i) }?;
     if g > 0.0 {
-        let (plain, forward) = (read(1), read(ETAS.len()));
+        let (plain, forward) = (read(1)?, read(ETAS.len())?);
         let more = g / FORWARD.1;
         error.total += more * (forward.total - plain.total);
         error.distribution += more * (forward.distribution - plain.distribution);
@@ -97,11 +147,23 @@ pub fn expected_error(model: ModelName, calibrated: bool, place: &Place) -> Expe
             error.far.zip(forward.far.zip(plain.far)).map(|(far, (with, without))| far + more * (with - without));
         error.distribution = error.distribution.max(error.total.abs()).max(0.0);
     }
-    error
+    Ok(error)
 }
 
-fn mix(a: ExpectedError, b: ExpectedError, at: f64) -> ExpectedError {
-    ExpectedError {
+/// Least and largest reduced albedo of the table, for a mean cosine of `g`.
+pub fn measured_albedos(g: f64) -> [f64; 2] {
+    let albedos = &table().media[if g > 0.0 { ETAS.len() } else { 1 }].albedos;
+    [albedos[0], albedos[albedos.len() - 1]]
+}
+
+/// A number of single precision may miss the end of a range by this.
+const SLACK: f64 = 1e-5;
+
+type Read = std::result::Result<ExpectedError, Unmeasured>;
+
+fn mix(a: Read, b: Read, at: f64) -> Read {
+    let (a, b) = (a?, b?);
+    Ok(ExpectedError {
         total: a.total + at * (b.total - a.total),
         distribution: a.distribution + at * (b.distribution - a.distribution),
         far: match (a.far, b.far) {
@@ -114,7 +176,7 @@ fn mix(a: ExpectedError, b: ExpectedError, at: f64) -> ExpectedError {
                 }
             }
         },
-    }
+    })
 }
 
 /// Rows of one η and g.
@@ -122,8 +184,8 @@ fn mix(a: ExpectedError, b: ExpectedError, at: f64) -> ExpectedError {
 struct Shapes {
     /// α′, ascending.
     albedos: Vec<f64>,
-    /// By column, then shape: the half space, slabs, balls; then albedo.
-    errors: Vec<Vec<Vec<ExpectedError>>>,
+    /// By column, then shape: the half space, slabs, balls; then albedo. None where the model does not exist.
+    errors: Vec<Vec<Vec<Option<ExpectedError>>>>,
 }
 
 /// One for each of [`ETAS`], and [`FORWARD`].
@@ -132,8 +194,14 @@ struct Table {
 }
 
 impl Shapes {
-    fn shape(&self, column: usize, place: &Place) -> ExpectedError {
-        let thickness = if place.thickness.is_nan() { f64::INFINITY } else { place.thickness.max(0.0) };
+    fn shape(&self, column: usize, place: &Place) -> Read {
+        if place.thickness.is_nan() {
+            return Err(Unmeasured::Open);
+        }
+        let thickness = place.thickness;
+        if thickness < SIZES[0] * (1.0 - SLACK) {
+            return Err(Unmeasured::Thin);
+        }
         let curvature = if place.curvature.is_finite() { place.curvature.max(0.0) } else { 0.0 };
         let weight = 0.5 * thickness * curvature;
         let slab = |h: f64| self.sized(column, 1, h, place.alpha_prime);
@@ -148,7 +216,7 @@ impl Shapes {
     }
 
     /// Of the rows that begin at `first`, the size `size`.
-    fn sized(&self, column: usize, first: usize, size: f64, alpha_prime: f64) -> ExpectedError {
+    fn sized(&self, column: usize, first: usize, size: f64, alpha_prime: f64) -> Read {
         let row = |i: usize| self.albedo(column, if i < SIZES.len() { first + i } else { 0 }, alpha_prime);
         let last = SIZES.len() - 1;
         if size <= SIZES[0] {
@@ -158,21 +226,25 @@ impl Shapes {
             return mix(row(last + 1), row(last), SIZES[last] / size);
         }
         let i = SIZES.iter().rposition(|&s| s <= size).unwrap_or(0);
-        mix(row(i), row(i + 1), (size / SIZES[i]).ln() / (SIZES[i + 1] / SIZES[i]).ln())
+        let at = (size / SIZES[i]).ln() / (SIZES[i + 1] / SIZES[i]).ln();
+        if at > 0.0 { mix(row(i), row(i + 1), at) } else { row(i) }
     }
 
-    fn albedo(&self, column: usize, shape: usize, alpha_prime: f64) -> ExpectedError {
+    fn albedo(&self, column: usize, shape: usize, alpha_prime: f64) -> Read {
         let (errors, albedos) = (&self.errors[column][shape], &self.albedos);
-        let i = albedos.partition_point(|&a| a <= alpha_prime);
-        if i == 0 {
-            return errors[0];
+        let (first, last) = (albedos[0], albedos[albedos.len() - 1]);
+        // Linear in ln(1 - α′): a hundredth of 1 - α′ is nothing.
+        if alpha_prime.is_nan() || alpha_prime < first - SLACK || 1.0 - alpha_prime < 0.99 * (1.0 - last) {
+            return Err(Unmeasured::Albedo);
         }
-        if i == albedos.len() {
-            return errors[i - 1];
+        let read = |i: usize| errors[i].ok_or(Unmeasured::Model);
+        let i = albedos.partition_point(|&a| a <= alpha_prime);
+        if i == 0 || i == albedos.len() {
+            return read(i.max(1) - 1);
         }
         let depth = |a: f64| (1.0 - a).ln();
         let at = (depth(alpha_prime) - depth(albedos[i - 1])) / (depth(albedos[i]) - depth(albedos[i - 1]));
-        mix(errors[i - 1], errors[i], at)
+        mix(read(i - 1), read(i), at)
     }
 }
 
@@ -184,7 +256,7 @@ fn table() -> &'static Table {
 /// Columns before those of the models.
 const KEYS: usize = 6;
 
-/// The file is our own: a cell that is no number is a model that does not exist there, and counts as wrong by all.
+/// The file is our own: a cell that is no number is a model that does not exist there.
 fn read(text: &str) -> Table {
     let media = ETAS.map(|eta| (eta, 0.0)).into_iter().chain([FORWARD]);
     let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
@@ -202,15 +274,14 @@ fn read(text: &str) -> Table {
         let mut albedos: Vec<f64> = mine().filter_map(|row| number(row, 4)).collect();
         albedos.sort_by(f64::total_cmp);
         albedos.dedup();
-        let nothing = ExpectedError { total: -1.0, distribution: 1.0, far: None };
-        let mut errors = vec![vec![vec![nothing; albedos.len()]; 1 + 2 * SIZES.len()]; MODELS.len()];
+        let mut errors = vec![vec![vec![None; albedos.len()]; 1 + 2 * SIZES.len()]; MODELS.len()];
         for row in mine() {
             let Some(albedo) = albedos.iter().position(|&a| number(row, 4) == Some(a)) else { continue };
             for (column, errors) in errors.iter_mut().enumerate() {
                 let cell = |k: usize| number(row, KEYS + 2 * column + k);
                 let far = number(row, KEYS + 2 * MODELS.len() + column);
                 if let (Some(total), Some(distribution)) = (cell(0), cell(1)) {
-                    errors[shape(row)][albedo] = ExpectedError { total, distribution, far };
+                    errors[shape(row)][albedo] = Some(ExpectedError { total, distribution, far });
                 }
             }
         }
@@ -243,7 +314,7 @@ mod tests {
             ("1.3,0,ball,2,0.7,", place(0.7, 4.0, 0.5)),
             ("1.3,0,ball,50,0.99,", place(0.99, 1000.0, 0.02)),
             ("1.5,0,slab,10,0.97,", Place { eta: 1.5, ..place(0.97, 10.0, -3.0) }),
-            ("1,0,half,0,0.5,", Place { eta: 0.8, ..place(0.5, f64::NAN, f64::NAN) }),
+            ("1,0,half,0,0.5,", Place { eta: 1.0, ..place(0.5, f64::INFINITY, f64::NAN) }),
             ("1.3,0.8,ball,10,0.9,", Place { g: 0.8, ..place(0.9, 20.0, 0.1) }),
         ] {
             let cells = row(head);
@@ -251,7 +322,7 @@ mod tests {
                 if cells[2 * k].is_nan() {
                     continue;
                 }
-                let error = expected_error(model, calibrated, &place);
+                let error = expected_error(model, calibrated, &place).unwrap();
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
                 assert!(
                     close(error.total, cells[2 * k]) && close(error.distribution, cells[2 * k + 1]),
@@ -271,9 +342,9 @@ mod tests {
             for (k, shapes) in medium.errors.iter().enumerate() {
                 for (shape, errors) in shapes.iter().enumerate() {
                     for e in errors {
-                        assert!(e.distribution + 2e-3 >= e.total.abs(), "{k} {shape} {e:?}");
                         // The slab of one transport mean free path is the only thing that does not exist.
-                        assert!(e.total != -1.0 || k == 6 && (shape == 1), "{k} {shape}");
+                        assert!(e.is_some() != (k == 6 && shape == 1), "{k} {shape}");
+                        assert!(e.is_none_or(|e| e.distribution + 2e-3 >= e.total.abs()), "{k} {shape} {e:?}");
                     }
                 }
             }
@@ -284,7 +355,7 @@ mod tests {
     #[test]
     fn a_bent_sheet_lies_between_the_sheet_and_the_ball() {
         let (sheet, ball) = (row("1.3,0,slab,10,0.9,"), row("1.3,0,ball,5,0.9,"));
-        let error = expected_error(ModelName::Standard, false, &place(0.9, 10.0, 0.05));
+        let error = expected_error(ModelName::Standard, false, &place(0.9, 10.0, 0.05)).unwrap();
         let column = 2 * MODELS.iter().position(|m| *m == (ModelName::Standard, false)).unwrap();
         let expected = 0.75 * sheet[column] + 0.25 * ball[column];
         assert!((error.total - expected).abs() < 1e-9, "{error:?} {expected}");
@@ -295,15 +366,60 @@ mod tests {
         for model in [ModelName::Standard, ModelName::Beam] {
             let mut last = None;
             for i in 0..4000 {
-                let thickness = 10f64.powf(f64::from(i) / 1000.0 - 1.0);
-                let error = expected_error(model, false, &place(0.95, thickness, 0.05)).distribution;
+                let thickness = 10f64.powf(f64::from(i) / 1000.0);
+                let error = expected_error(model, false, &place(0.95, thickness, 0.05)).unwrap().distribution;
                 assert!(last.is_none_or(|l: f64| (l - error).abs() < 0.02), "{thickness}: {last:?} {error}");
                 last = Some(error);
             }
             for far in [1e6, f64::INFINITY] {
-                let half = expected_error(model, false, &place(0.95, f64::INFINITY, 0.0)).distribution;
-                assert!((expected_error(model, false, &place(0.95, far, 1e-9)).distribution - half).abs() < 1e-4);
+                let error = |far, bent| expected_error(model, false, &place(0.95, far, bent)).unwrap().distribution;
+                assert!((error(far, 1e-9) - error(f64::INFINITY, 0.0)).abs() < 1e-4);
             }
         }
+    }
+
+    /// No figure is made up: not beyond the table, not for what is no model of it.
+    #[test]
+    fn what_has_not_been_measured_has_no_figure() {
+        let sound = place(0.9, 10.0, 0.0);
+        let of = |model, place: Place| expected_error(model, false, &place).err();
+        let beam = |place| of(ModelName::Beam, place);
+        assert_eq!(beam(sound), None);
+        for alpha_prime in [0.0, 0.29, 0.99992, 1.0, f64::NAN] {
+            assert_eq!(beam(Place { alpha_prime, ..sound }), Some(Unmeasured::Albedo), "{alpha_prime}");
+        }
+        for eta in [0.67, 0.99, 1.51, f64::NAN] {
+            assert_eq!(beam(Place { eta, ..sound }), Some(Unmeasured::Index), "{eta}");
+        }
+        for g in [-0.999, -0.01, 0.81, f64::NAN] {
+            assert_eq!(beam(Place { g, ..sound }), Some(Unmeasured::Cosine), "{g}");
+        }
+        assert_eq!(
+            beam(Place { g: 0.4, alpha_prime: 0.4, ..sound }),
+            Some(Unmeasured::Albedo),
+            "g = 0.8 begins at 0.5"
+        );
+        assert_eq!(beam(Place { thickness: f64::NAN, ..sound }), Some(Unmeasured::Open));
+        assert_eq!(beam(Place { thickness: 0.99, ..sound }), Some(Unmeasured::Thin));
+        assert_eq!(of(ModelName::Auto, sound), Some(Unmeasured::Model));
+        assert_eq!(of(ModelName::Slab, Place { thickness: 1.5, ..sound }), Some(Unmeasured::Model));
+        assert_eq!(of(ModelName::Slab, sound), None);
+        // The nearest end has.
+        for place in [
+            Place { g: 0.4, alpha_prime: 0.1, ..sound },
+            Place { alpha_prime: 1.0, g: -0.9, ..sound },
+            Place { eta: 2.0, thickness: 0.01, curvature: 100.0, ..sound },
+            Place { eta: 0.7, g: 0.99, ..sound },
+        ] {
+            let nearest = place.nearest_measured();
+            assert!(beam(place).is_some() && beam(nearest).is_none(), "{place:?} {nearest:?}");
+            assert_eq!(place.thickness * place.curvature, nearest.thickness * nearest.curvature);
+        }
+        assert_eq!(sound.nearest_measured(), sound);
+        // Single precision may not throw out the ends.
+        let ends = Place { eta: f64::from(1.5_f32), alpha_prime: f64::from(0.3_f32), g: f64::from(-0.0_f32), ..sound };
+        assert_eq!(beam(ends), None);
+        assert_eq!(beam(Place { alpha_prime: 1.0 - 0.999e-4, ..sound }), None);
+        assert_eq!((measured_albedos(0.0), measured_albedos(0.5)), ([0.3, 0.9999], [0.5, 0.9999]));
     }
 }

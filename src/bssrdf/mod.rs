@@ -31,7 +31,7 @@ pub use channel::ChannelMedium;
 pub use depth::DepthLaw;
 pub use directional::{DirectionalChannel, DirectionalDipole};
 pub use directional_gather::DirectionColumns;
-pub use expected::{ExpectedError, Place, expected_error};
+pub use expected::{ExpectedError, Place, Unmeasured, expected_error, measured_albedos};
 pub use normalised::{NormalisedDiffusion, WidthFit};
 pub use partition::Partition;
 pub use radial::{EntryColumns, Gather, Radial};

@@ -1,15 +1,16 @@
 //! `marmor check`: what is in a scene, what will be built, and what is left out.
 
+use super::advice::{Advice, short};
 use super::files::{Files, Remedy};
 use super::need;
 use super::setup::{MethodArgs, prepare};
 use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
-use marmor::geometry::{Mended, Mesh, load_obj, mended, write_obj};
-use marmor::integrator::{LocalShape, TOLERANCE, Trustworthiness, View};
+use marmor::geometry::{Mended, load_obj, mended, write_obj};
+use marmor::integrator::{TOLERANCE, View};
 use marmor::optics::Medium;
 use marmor::query;
-use marmor::scene::{Geometry, Scene, Surface};
+use marmor::scene::{Geometry, Object, Scene, Surface};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -41,42 +42,63 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let parts = prepared.method.parts(scene);
     let [width, height] = scene.camera.resolution;
     let available = marmor::memory::available();
-    // For the models and for what a pass takes; where nothing is translucent there is nothing to ask.
-    let translucent = scene.materials.iter().any(|m| matches!(m.surface, Surface::Translucent(_)));
-    let meshes = scene.meshes();
-    let rays = translucent.then(|| query::build(prepared.backend, &meshes)).transpose()?;
-    let view = rays.as_ref().map(|rays| View { scene, rays: &**rays });
-    let need = need::of(&prepared, Window::full([width, height]), view);
-    let trust = view.map_or(Vec::new(), |view| trust(view, args.tolerance));
+    let (meshes, window) = (scene.meshes(), Window::full([width, height]));
+    let rays = query::build(prepared.backend, &meshes)?;
+    let view = View { scene, rays: &*rays };
+    let need = need::of(&prepared, window, Some(view));
+    let advice = Advice::new(&prepared, view, window, usize::MAX, args.tolerance);
+    let warnings: Vec<String> = scene.warnings.iter().cloned().chain(advice.warning()).collect();
     if args.json {
-        let objects: Vec<Value> = scene.objects.iter().map(|o| object_json(scene, o)).collect();
+        let objects = scene.objects.iter().zip(&advice.shares);
         let report = json!({
             "scene": scene.name,
             "unit_in_mm": scene.unit_in_mm,
             "resolution": [width, height],
             "method": prepared.method.name(),
             "backend": prepared.backend.name(),
-            "objects": objects,
+            "objects": objects.map(|(object, share)| object_json(scene, object, *share)).collect::<Vec<_>>(),
             "parts": parts,
-            "validity": trust.iter().map(|t| {
-                let mut value = json!(t);
-                value["sentence"] = t.sentence().into();
-                value
-            }).collect::<Vec<_>>(),
+            "validity": advice.bodies.iter().map(|t| advice.json(t)).collect::<Vec<_>>(),
+            "says": advice.lines(),
+            "look_at": advice.empty.as_ref().map(|aim| aim.at.to_array()),
             "film_bytes": need.film,
             "picture_bytes": need.pictures,
             "memory": need,
             "available_bytes": available,
-            "warnings": scene.warnings,
+            "warnings": warnings,
         });
         println!("{report:#}");
         return Ok(ExitCode::SUCCESS);
     }
     let unit = scene.unit_in_mm.map_or("unit not declared".into(), |mm| format!("1 unit = {mm} mm"));
     println!("{}: {unit}, {width}x{height} pixels", scene.name);
+    let backend = if scene.why_double.is_some() { "rays in double precision" } else { prepared.backend.name() };
+    println!("method {} on {backend}", prepared.method.name());
+    if !warnings.is_empty() {
+        println!("\nwarnings");
+        warnings.iter().for_each(|warning| println!("  {warning}"));
+    }
+    if let Some(line) = advice.without_models() {
+        println!("\n{line}");
+    } else if !advice.bodies.is_empty() {
+        println!(
+            "\nwhich model to trust (error: light that is missing or too much where it comes out, added up; even light hides part of it)"
+        );
+        advice.bodies.iter().flat_map(|t| advice.paragraph(t)).for_each(|line| println!("  {line}"));
+    }
+    println!("\nobjects");
+    for (object, share) in scene.objects.iter().zip(&advice.shares) {
+        tell(scene, object, *share);
+    }
+    for (built, title) in [(true, "built"), (false, "left out")] {
+        println!("\n{title}");
+        for part in parts.iter().filter(|p| p.built == built) {
+            println!("  {}: {}", part.name, part.why);
+        }
+    }
     let mega = |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6);
     println!(
-        "memory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, cache or photons {}; \
+        "\nmemory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, cache or photons {}; \
          available {}",
         mega(need.peak),
         mega(need.film),
@@ -87,52 +109,56 @@ pub fn run(args: Args) -> Result<ExitCode> {
         mega(need.pass),
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );
-    let backend = if scene.why_double.is_some() { "rays in double precision" } else { prepared.backend.name() };
-    println!("method {} on {backend}", prepared.method.name());
-    println!("\nobjects");
-    for object in &scene.objects {
-        let material = &scene.materials[object.material];
-        let (area, size) = measures(&object.mesh);
-        println!(
-            "  {}: {} triangles, area {area:.6} unit², {:.6} x {:.6} x {:.6}; material {} ({})",
-            object.name,
-            object.mesh.triangles.len(),
-            size[0],
-            size[1],
-            size[2],
-            material.name,
-            describe(&material.surface)
-        );
-        for remark in scene.remarks(object) {
-            println!("    {}: {}", if remark.warns { "warning" } else { "note" }, remark.text);
-        }
-    }
-    if !trust.is_empty() {
-        println!("\nwhich model to trust");
-        trust.iter().for_each(|t| println!("  {}", t.sentence()));
-    }
-    for (built, title) in [(true, "built"), (false, "left out")] {
-        println!("\n{title}");
-        for part in parts.iter().filter(|p| p.built == built) {
-            println!("  {}: {}", part.name, part.why);
-        }
-    }
-    if !scene.warnings.is_empty() {
-        println!("\nwarnings");
-        for warning in &scene.warnings {
-            println!("  {warning}");
-        }
-    }
     Ok(ExitCode::SUCCESS)
 }
 
-/// How far models can be trusted on each translucent object.
-fn trust(view: View<'_>, tolerance: f64) -> Vec<Trustworthiness> {
-    let scene = view.scene;
-    let translucent = |object: &u32| matches!(scene.surface(*object), Surface::Translucent(_));
-    let objects = (0..scene.objects.len() as u32).filter(translucent);
-    let of = |object: u32| Trustworthiness::new(view, &LocalShape::new(scene, object)?, tolerance);
-    objects.filter_map(of).collect()
+/// An object in some lines: where and how large it is, how much of the picture it fills, what it is made of.
+fn tell(scene: &Scene, object: &Object, share: f64) {
+    let (material, Extent { area, size, bounds }) = (&scene.materials[object.material], Extent::new(scene, object));
+    let lengths = |v: [f64; 3], by: &str| v.map(short).join(by);
+    let mm = scene.unit_in_mm.filter(|mm| *mm != 1.0);
+    let in_mm = mm.map_or(String::new(), |mm| format!(" ({} mm)", lengths(size.map(|s| s * mm), " x ")));
+    println!("  {}: {} triangles, {} units{in_mm}", object.name, object.mesh.triangles.len(), lengths(size, " x "));
+    println!(
+        "    from ({}) to ({}); {}",
+        lengths(bounds[0], ", "),
+        lengths(bounds[1], ", "),
+        match share {
+            0.0 => "not in the picture, or tiny in it".into(),
+            share if share < 0.01 => "less than 1 % of the picture".into(),
+            share => format!("{:.0} % of the picture", 100.0 * share),
+        }
+    );
+    println!(
+        "    area {} unit²; material {}: {}",
+        short(area),
+        material.name,
+        describe(&material.surface).join("\n    ")
+    );
+    if let Surface::Translucent(t) = &material.surface {
+        odd_size(&t.medium, size).iter().for_each(|note| println!("    note: {note}"));
+    }
+    for remark in scene.remarks(object).iter().filter(|r| !r.warns) {
+        println!("    note: {}", remark.text);
+    }
+}
+
+/// As many transport mean free paths across, and light hardly spreads.
+const LARGE: f64 = 1000.0;
+
+/// A body so large for its medium that a unit may be wrong; the opposite is among the warnings.
+fn odd_size(medium: &Medium, size: [f64; 3]) -> Option<String> {
+    let paths = medium.transport_mean_free_path().0.map(f64::from);
+    let path = paths.into_iter().filter(|l| l.is_finite()).fold(0.0, f64::max);
+    let (length, times) = (size.into_iter().fold(0.0, f64::max), size.into_iter().fold(0.0, f64::max) / path);
+    (path > 0.0 && times > LARGE).then(|| {
+        format!(
+            "{} units is {} transport mean free paths: light hardly spreads on it; if it should glow, check `unit` and \
+             the coefficients",
+            short(length),
+            short(times)
+        )
+    })
 }
 
 /// Writes mended meshes, in their own space: before the object's transform, after its `flip`. Nothing is written over what
@@ -176,43 +202,62 @@ fn tolerance(text: &str) -> std::result::Result<f64, String> {
     }
 }
 
-/// Area [unit²] and edges of the bounding box [unit].
-fn measures(mesh: &Mesh) -> (f64, [f64; 3]) {
-    let area = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
-    let size = mesh.bounds().map_or([0.0; 3], |(lo, hi)| (hi - lo).to_array());
-    (area, size)
+/// Where an object is, in the coordinates of the scene file.
+struct Extent {
+    /// [unit²].
+    area: f64,
+    /// Edges of the bounding box [unit].
+    size: [f64; 3],
+    /// Its corners [unit].
+    bounds: [[f64; 3]; 2],
 }
 
-fn describe(surface: &Surface) -> String {
+impl Extent {
+    fn new(scene: &Scene, object: &Object) -> Self {
+        let mesh = &object.mesh;
+        let area = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
+        let (lo, hi) = mesh.bounds().unwrap_or_default();
+        // Coordinates keep what rounding about the scene's centre leaves of them.
+        let least = 1e-6 * (hi - lo).max_element().max(scene.centre.abs().max_element());
+        let place = |v: f64| if v.abs() < least { 0.0 } else { v };
+        Self { area, size: (hi - lo).to_array(), bounds: [lo, hi].map(|p| (p + scene.centre).to_array().map(place)) }
+    }
+}
+
+/// The kind of a surface, and its numbers.
+fn describe(surface: &Surface) -> Vec<String> {
     match surface {
-        Surface::Diffuse { albedo } => format!("diffuse, albedo {:?}", albedo.0),
+        Surface::Diffuse { albedo } => vec![format!("diffuse, albedo {:?}", albedo.0)],
         Surface::Emissive { radiance, two_sided } => {
-            format!("emissive, radiance {:?}{}", radiance.0, if *two_sided { ", two-sided" } else { "" })
+            vec![format!("emissive, radiance {:?}{}", radiance.0, if *two_sided { ", two-sided" } else { "" })]
         }
         Surface::Translucent(t) => {
-            let Medium { eta, .. } = t.medium;
             let free_path = t.medium.sigma_t_prime().map(|s| 1.0 / s);
-            format!(
-                "translucent, {}, model {}, eta {eta}, reduced albedo {:.4?}, transport mean free path {:.4?} unit",
-                t.source,
-                t.model_text(),
-                t.medium.alpha_prime().0,
-                free_path.0
-            )
+            vec![
+                format!("translucent, {}, model {}", t.source, t.model_text()),
+                format!(
+                    "eta {}, reduced albedo {:.4?}, transport mean free path [{}] unit",
+                    t.medium.eta,
+                    t.medium.alpha_prime().0,
+                    free_path.0.map(|l| short(l.into())).join(", ")
+                ),
+            ]
         }
     }
 }
 
-fn object_json(scene: &Scene, object: &marmor::scene::Object) -> Value {
-    let material = &scene.materials[object.material];
-    let (area, size) = measures(&object.mesh);
+fn object_json(scene: &Scene, object: &Object, share: f64) -> Value {
+    let (material, Extent { area, size, bounds }) = (&scene.materials[object.material], Extent::new(scene, object));
     json!({
         "name": object.name,
         "triangles": object.mesh.triangles.len(),
         "area": area,
         "size": size,
+        "from": bounds[0],
+        "to": bounds[1],
+        "in_picture": share,
         "material": material.name,
-        "surface": describe(&material.surface),
+        "surface": describe(&material.surface).join(", "),
         "findings": object.findings,
         "remarks": scene.remarks(object),
     })

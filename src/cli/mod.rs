@@ -15,6 +15,7 @@ macro_rules! println {
     ($($text:tt)*) => { crate::cli::stdout::write(format_args!("{}\n", format_args!($($text)*))) };
 }
 
+mod advice;
 mod check;
 mod compare;
 mod converge;

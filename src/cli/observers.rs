@@ -68,7 +68,7 @@ impl OwnError {
             Some([low, high]) => format!("(95 %: {low:.2e} to {high:.2e})"),
             None if relmse.value > 0.0 && passes >= 4 => "(no interval: the earlier passes were not followed)".into(),
             None if relmse.value > 0.0 => "(no interval before 4 passes)".into(),
-            None => "(no noise)".into(),
+            None => return "estimated relMSE: nothing to measure, all passes are the same picture".into(),
         };
         let out = format!("estimated relMSE {:.2e} {interval}", relmse.value);
         match told.worst.filter(|worst| worst.share > HANGS) {
@@ -218,7 +218,7 @@ impl Observer for ProgressDisplay {
         let passes = progress.film.passes();
         let elapsed = progress.seconds.total();
         let not_met = self.own.not_met_text();
-        let error = self.own.relmse().map_or(String::new(), |e| {
+        let error = self.own.relmse().filter(|e| e.value > 0.0).map_or(String::new(), |e| {
             if !not_met.is_empty() {
                 return format!(", {not_met}");
             }

@@ -1,6 +1,7 @@
 //! `marmor render`: from a scene file to pictures. Reads in the order it runs.
 
 use super::INTERRUPTED;
+use super::advice::Advice;
 use super::files::{Files, Remedy};
 use super::keep::{FilmFile, KeepArgs, Keeper, cancel_on_signals};
 use super::layers::{LayerName, Layers};
@@ -152,6 +153,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             description: rays.description(),
             effective: prepared.file.effective(),
             own: OwnError::default(),
+            advice: None,
             earlier,
             failed: None,
         };
@@ -168,6 +170,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
                 rayon::current_num_threads()
             );
         }
+        let silent = verbosity == Verbosity::Quiet;
+        let advice = (!silent || args.stats.is_some()).then(|| Advice::before_render(&prepared, view, window, silent));
+        task.advice = advice.as_ref();
         let finished = match &prepared.method {
             Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
             Method::Direct(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
@@ -245,6 +250,7 @@ struct Task<'a> {
     description: String,
     effective: String,
     own: OwnError,
+    advice: Option<&'a Advice<'a>>,
     /// Time of rendering in earlier runs [s].
     earlier: f64,
     /// What could not be written beside the pictures.
@@ -296,6 +302,7 @@ impl Task<'_> {
                 backend: &self.description,
                 seconds_setup,
                 parts: &parts,
+                advice: self.advice,
                 outcome: &outcome,
                 film,
             };

@@ -1,5 +1,6 @@
 //! `--stats`: what was built, what it cost, how fast it went.
 
+use super::advice::Advice;
 use marmor::film::{Film, write_atomically};
 use marmor::integrator::Part;
 use marmor::render::Outcome;
@@ -16,13 +17,15 @@ pub struct Stats<'a> {
     pub backend: &'a str,
     pub seconds_setup: f64,
     pub parts: &'a [Part],
+    /// What was said before the first pass.
+    pub advice: Option<&'a Advice<'a>>,
     pub outcome: &'a Outcome,
     pub film: &'a Film,
 }
 
 /// Writes the statistics of a finished render.
 pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
-    let Stats { effective, scene, backend, seconds_setup, parts, outcome, film } = stats;
+    let Stats { effective, scene, backend, seconds_setup, parts, advice, outcome, film } = stats;
     let (seconds, tally) = (outcome.seconds, outcome.tally);
     let per_second = |count: u64, seconds: f64| if seconds > 0.0 { count as f64 / seconds } else { 0.0 };
     let exits = tally.gather.exits.max(1) as f64;
@@ -38,6 +41,9 @@ pub fn write(path: &Path, stats: &Stats<'_>) -> Result<()> {
             "material": scene.materials[o.material].name,
         })).collect::<Vec<_>>(),
         "parts": parts,
+        "validity": advice.map(|a| a.bodies.iter().map(|t| a.json(t)).collect::<Vec<_>>()),
+        "in_picture": advice.map(|a| &a.shares),
+        "says": advice.map(|a| a.lines()),
         "passes": film.passes(),
         "peak_bytes": marmor::memory::peak(),
         "seconds": { "setup": seconds_setup, "cache": seconds.cache, "gather": seconds.gather },

@@ -46,7 +46,7 @@ impl Halves {
     fn of(film: &Film) -> Option<Self> {
         let state = State::of(film)?;
         let mut single = film.variance()?;
-        single.pixels.iter_mut().for_each(|p| *p = *p * film.passes() as f32);
+        single.pixels.iter_mut().for_each(|p| *p *= film.passes() as f32);
         Some(Self { state, single })
     }
 }

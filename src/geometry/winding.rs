@@ -151,6 +151,6 @@ fn distance(face: &Face, p: DVec3) -> f64 {
 /// Directions that no grid and no symmetry has.
 fn direction(i: u32) -> DVec3 {
     let i = f64::from(i);
-    DVec3::new((0.3711 + 1.3247 * i).sin(), (1.1273 + 2.2361 * i).sin(), (2.7813 + 3.1415 * i).cos())
+    DVec3::new((0.3711 + 1.3247 * i).sin(), (1.1273 + 2.2361 * i).sin(), (2.7813 + 3.1573 * i).cos())
         .normalize_or(DVec3::X)
 }

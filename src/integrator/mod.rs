@@ -22,11 +22,11 @@ use crate::scene::{Obstacle, Scene};
 pub use ambient_occlusion::AmbientOcclusion;
 pub use direct::Direct;
 pub use first_order::FirstOrder;
-pub use local::{Local, LocalShape};
+pub use local::{Candidate, Local, LocalShape};
 pub use losses::{Cause, Loss, Losses, TOLERATED};
 pub use met::KnownLights;
 pub use subsurface::{Subsurface, SubsurfaceOptions};
-pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness};
+pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness, Verdict};
 pub use volume_path::{Left, VolumePath, VolumePathOptions};
 
 /// The scene and the backend that was built for it.

@@ -1,33 +1,64 @@
-//! Which model to trust on a whole body, and why: errors expected over its surface, in numbers and in a sentence.
+//! Which model to trust on a whole body, and why: errors expected over its surface, in numbers. Words are the program's.
 
 use super::View;
-use super::local::LocalShape;
-use crate::bssrdf::{ExpectedError, ModelName, Place, expected_error};
-use crate::geometry::AreaTable;
+use super::local::{Candidate, Local, LocalShape};
+use crate::bssrdf::{ExpectedError, ModelName, Place, Unmeasured, expected_error};
+use crate::geometry::Mesh;
+use crate::optics::FresnelMoments;
+use crate::scene::{ObstacleKind, Scene, Surface, Translucent};
+use rayon::prelude::*;
 use serde::Serialize;
 
 /// Points on the surface.
-const POINTS: u32 = 2048;
+const POINTS: u32 = 256;
 
 /// Wrong by more than this counts as not to be trusted: what `beam`, the best model of a plane, is wrong by on one in the
 /// media of the first two rows of the chart in docs/models.md, and no more.
 pub const TOLERANCE: f64 = 0.1;
 
-/// A model on a body.
+/// A model on a body. Figures are means over the part of the area where the model has been measured, if that is most of it.
 #[derive(Clone, Debug, Serialize)]
 pub struct ModelOnBody {
-    /// Its name.
-    pub model: String,
+    /// Its name, as in scene files.
+    pub model: &'static str,
+    /// `directional` scaled to the true albedo.
+    pub calibrated: bool,
+    /// Of a slab [unit].
+    pub thickness: Option<f32>,
     /// Whether it is the material's own.
     pub chosen: bool,
-    /// Expected error of the total, mean over the area; above 0 it is too bright.
-    pub total: f64,
-    /// Expected error of the distribution, mean over the area.
-    pub distribution: f64,
-    /// Of the light that leaves far from its entry, signed, mean over the area: what counts where a body is lit from behind.
+    /// Share of the area where it has been measured.
+    pub measured: f64,
+    /// Why not elsewhere.
+    pub unmeasured: Option<Unmeasured>,
+    /// Expected error of the total; above 0 it is too bright.
+    pub total: Option<f64>,
+    /// Expected error of the distribution.
+    pub distribution: Option<f64>,
+    /// Of the light that leaves far from its entry, signed: what counts where a body is lit from behind.
     pub far: Option<f64>,
     /// Share of the area where the error of the distribution is beyond the tolerance.
-    pub beyond: f64,
+    pub beyond: Option<f64>,
+}
+
+/// What follows for a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// The best model is within the tolerance all over the body.
+    Trust,
+    /// On most of it, where it is thick.
+    WhereThick,
+    /// The body is too thin for any model.
+    TooThin,
+    /// No model is within the tolerance, whatever the thickness.
+    Nowhere,
+    /// A sheet without thickness, or one whose holes are most of it: no model has an inside to work on.
+    Open,
+    /// Its faces look inwards: nothing can be said before they are turned.
+    InsideOut,
+    /// No model has been measured there.
+    NotMeasured,
 }
 
 /// A body and the models on it.
@@ -35,139 +66,191 @@ pub struct ModelOnBody {
 pub struct Trustworthiness {
     /// The object's name.
     pub object: String,
+    /// Its number in the scene.
+    pub index: u32,
     /// The material's name.
     pub material: String,
     /// Smallest and largest reduced albedo of the channels.
     pub alpha_prime: [f64; 2],
-    /// Thickness that 5, 50 and 95 % of the area stay below [transport mean free paths of the channel in which light goes
-    /// farthest]; none where there is no other side.
+    /// n_inside / n_outside.
+    pub eta: f64,
+    /// Mean cosine of the phase function.
+    pub g: f64,
+    /// Share of the area without another side: the inward normal meets nothing of the body.
+    pub open: f64,
+    /// Thickness that 5, 50 and 95 % of the area with another side stay below [transport mean free paths of the channel in
+    /// which light goes farthest]; none on an open sheet.
     pub thickness: [Option<f64>; 3],
     /// Likewise mean curvature [1 / transport mean free path].
-    pub curvature: [f64; 3],
+    pub curvature: [Option<f64>; 3],
     /// What counts as wrong.
     pub tolerance: f64,
-    /// Models, the best first.
+    /// What follows.
+    pub verdict: Verdict,
+    /// Models, the best first, those without figures last.
     pub models: Vec<ModelOnBody>,
-    /// Thickness of a flat sheet from which the best model is within the tolerance [transport mean free paths]; none where it
-    /// never is.
+    /// Thickness of a flat sheet from which one of the models is within the tolerance [transport mean free paths]; none where
+    /// it never is.
     pub trusted_from: Option<f64>,
+    /// Without exit normalisation the material's own model is darker than its figures by this share.
+    pub darker: Option<f64>,
+    /// Why `volume_path` cannot trace it; none where it can.
+    pub untraceable: Option<String>,
 }
 
-/// Wrong on more than this share of the area, and no model is to be trusted.
+/// Half of the area: on less than that a figure stands for nothing.
 const MOSTLY: f64 = 0.5;
 
-/// Candidates beside the material's own model.
-const CANDIDATES: [(ModelName, bool); 4] = [
-    (ModelName::Beam, false),
-    (ModelName::Better, false),
-    (ModelName::Standard, false),
-    (ModelName::Directional, true),
+/// Candidates beside the material's own model, and a slab where the body is one.
+const CANDIDATES: [Candidate; 4] = [
+    Candidate { model: ModelName::Beam, calibrated: false, thickness: None },
+    Candidate { model: ModelName::Better, calibrated: false, thickness: None },
+    Candidate { model: ModelName::Standard, calibrated: false, thickness: None },
+    Candidate { model: ModelName::Directional, calibrated: true, thickness: None },
 ];
 
 impl Trustworthiness {
     /// Of the object of `shape`, where wrong is what is wrong by more than `tolerance`; `None` without area.
     pub fn new(view: View<'_>, shape: &LocalShape, tolerance: f64) -> Option<Self> {
         let object = &view.scene.objects[shape.object as usize];
-        let table = AreaTable::new(&object.mesh)?;
-        let points: Vec<_> = (0..POINTS)
-            .map(|i| {
-                // Points of a two-dimensional golden ratio: even, and the same in each run.
-                let [u, v] = [0.754_877_666, 0.569_840_291].map(|k: f64| (f64::from(i) * k).fract() as f32);
-                let at = table.sample((f64::from(i) + 0.5) / f64::from(POINTS), [u, v]);
-                shape.at(view, at.triangle, at.u, at.v)
+        let Surface::Translucent(material) = view.scene.surface(shape.object) else { return None };
+        let places = spread(&object.mesh, POINTS);
+        if places.is_empty() {
+            return None;
+        }
+        let locals: Vec<Local> = places
+            .par_iter()
+            .map(|&(triangle, u, v)| {
+                let at = object.mesh.point(triangle, u, v);
+                let thickness = shape.thickness(view, &at);
+                let curvature = if thickness.is_nan() { 0.0 } else { shape.curvature(view, &at, thickness) };
+                Local { thickness, curvature }
             })
             .collect();
-        let path =
-            shape.optics().iter().map(|k| k.transport_mean_free_path).filter(|l| l.is_finite()).fold(0.0, f64::max);
-        let own = shape.model();
-        let mut models: Vec<ModelOnBody> = CANDIDATES
-            .into_iter()
-            .filter(|m| *m != own)
-            .chain([own])
-            .map(|model| {
-                let errors: Vec<ExpectedError> =
-                    points.iter().filter_map(|p| shape.expected(model.0, model.1, *p)).map(|(e, _)| e).collect();
-                let n = errors.len().max(1) as f64;
-                ModelOnBody {
-                    model: name(model),
-                    chosen: model == own,
-                    total: errors.iter().map(|e| e.total).sum::<f64>() / n,
-                    distribution: errors.iter().map(|e| e.distribution).sum::<f64>() / n,
-                    far: mean(errors.iter().filter_map(|e| e.far)),
-                    beyond: errors.iter().filter(|e| e.distribution > tolerance).count() as f64 / n,
-                }
-            })
+        let closed: Vec<Local> = locals.iter().copied().filter(|l| !l.thickness.is_nan()).collect();
+        let open = 1.0 - closed.len() as f64 / locals.len() as f64;
+        let own = shape.own();
+        let mut candidates: Vec<Candidate> = CANDIDATES.into_iter().chain(as_slab(&closed, locals.len())).collect();
+        candidates.retain(|c| !c.is_kind_of(own) && exists(material, *c));
+        candidates.push(own);
+        let mut models: Vec<(Candidate, ModelOnBody)> = candidates
+            .into_par_iter()
+            .map(|candidate| (candidate, on_body(shape, candidate, candidate == own, &locals, tolerance)))
             .collect();
-        models.sort_by(|a, b| a.distribution.total_cmp(&b.distribution));
-        let best = CANDIDATES.into_iter().chain([own]).find(|m| name(*m) == models[0].model).unwrap_or(own);
-        let quantiles = |mut values: Vec<f64>| {
-            values.sort_by(f64::total_cmp);
-            [0.05, 0.5, 0.95].map(|q| values[(q * (values.len() - 1) as f64) as usize])
+        let order = |m: &ModelOnBody| m.distribution.unwrap_or(f64::INFINITY);
+        models.sort_by(|a, b| order(&a.1).total_cmp(&order(&b.1)));
+        let path = shape.longest_path();
+        let from = |(candidate, _): &(Candidate, ModelOnBody)| trusted_from(shape, *candidate, tolerance, path);
+        let trusted_from = models.iter().filter_map(from).reduce(f64::min);
+        let albedos =
+            || shape.optics().iter().filter(|k| k.transport_mean_free_path.is_finite()).map(|k| k.alpha_prime);
+        let moments = FresnelMoments::new(shape.eta());
+        let normalised = material.exit_normalisation || own.model == ModelName::Directional;
+        let verdict = match models[0].1.beyond {
+            _ if object.findings.inside_out() => Verdict::InsideOut,
+            _ if open > MOSTLY || is_sheet(view.scene, &object.name) => Verdict::Open,
+            None => Verdict::NotMeasured,
+            Some(beyond) if beyond < 0.005 => Verdict::Trust,
+            Some(beyond) if beyond < MOSTLY => Verdict::WhereThick,
+            _ if trusted_from.is_some() => Verdict::TooThin,
+            _ => Verdict::Nowhere,
         };
-        let some = || shape.optics().iter().filter(|k| k.transport_mean_free_path.is_finite());
-        let albedos = some().map(|k| k.alpha_prime);
+        let quantiles = |of: fn(&Local) -> f32, scale: f64| {
+            let mut values: Vec<f64> = closed.iter().map(|l| f64::from(of(l)) * scale).collect();
+            values.sort_by(f64::total_cmp);
+            [0.05, 0.5, 0.95].map(|q| values.get((q * values.len().saturating_sub(1) as f64) as usize).copied())
+        };
         Some(Self {
             object: object.name.clone(),
+            index: shape.object,
             material: view.scene.materials[object.material].name.clone(),
-            alpha_prime: [albedos.clone().fold(1.0, f64::min), albedos.fold(0.0, f64::max)],
-            thickness: quantiles(points.iter().map(|p| f64::from(p.thickness) / path).collect())
-                .map(|t| Some(t).filter(|t| t.is_finite())),
-            curvature: quantiles(points.iter().map(|p| f64::from(p.curvature) * path).collect()),
+            alpha_prime: [albedos().fold(1.0, f64::min), albedos().fold(0.0, f64::max)],
+            eta: shape.eta(),
+            g: shape.g(),
+            open,
+            thickness: quantiles(|l| l.thickness, 1.0 / path),
+            curvature: quantiles(|l| l.curvature, path),
             tolerance,
-            trusted_from: trusted_from(shape, best, tolerance, path),
-            models,
+            verdict,
+            trusted_from,
+            darker: (!normalised).then_some(1.0 - moments.four_c_phi_outside),
+            untraceable: view.scene.untraceable(shape.object),
+            models: models.into_iter().map(|(_, model)| model).collect(),
         })
     }
 
-    /// What to trust, and why.
-    pub fn sentence(&self) -> String {
-        let percent = |v: f64| format!("{:.0} %", 100.0 * v);
-        let [low, high] = self.alpha_prime;
-        let albedo = if high - low < 5e-4 { format!("{high:.3}") } else { format!("{low:.3} to {high:.3}") };
-        let paths = |t: Option<f64>| t.map_or("endlessly many".into(), |t| format!("{t:.1}"));
-        let [thin, middle, thick] = self.thickness.map(paths);
-        let listed: Vec<String> = self
-            .models
-            .iter()
-            .map(|m| format!("`{}` {}{}", m.model, percent(m.distribution), if m.chosen { " (chosen)" } else { "" }))
-            .collect();
-        let best = &self.models[0];
-        let behind = best.far.map_or(String::new(), |far| {
-            let side = if far > 0.0 { "bright" } else { "dark" };
-            format!(" (light that comes through from behind: `{}` {} too {side})", best.model, percent(far.abs()))
-        });
-        let wrong = |what: &str| {
-            let share = if best.beyond > 0.995 {
-                "everywhere".into()
-            } else {
-                format!("on {} of the area", percent(best.beyond))
-            };
-            format!("{what} errs by more than {} {share}", percent(self.tolerance))
-        };
-        let verdict = match self.trusted_from {
-            _ if best.beyond < 0.005 => format!("trust `{}`", best.model),
-            Some(from) if best.beyond < MOSTLY => format!(
-                "trust `{}` where the body is thick; {} (sheets thinner than {from:.0} transport mean free paths, and what bends \
-                 as sharply): there take --method volume_path",
-                best.model,
-                wrong("it")
-            ),
-            Some(_) => format!(
-                "trust none, the body is too thin: even {}; take --method volume_path",
-                wrong(&format!("`{}`", best.model))
-            ),
-            None => format!(
-                "trust none, whatever the thickness: even {}; take --method volume_path",
-                wrong(&format!("`{}`", best.model))
-            ),
-        };
-        format!(
-            "{} ({}): reduced albedo {albedo}, {thin} to {thick} transport mean free paths thick (median {middle}). \
-             Expected error of how the light of a point spreads, mean over the area (smooth light evens some of it out): {}{behind}. So {verdict}",
-            self.object,
-            self.material,
-            listed.join(", ")
-        )
+    /// The material's own model.
+    pub fn own(&self) -> Option<&ModelOnBody> {
+        self.models.iter().find(|m| m.chosen)
+    }
+}
+
+/// `count` places on a mesh, evenly by area in the order of its triangles: the same in each run.
+fn spread(mesh: &Mesh, count: u32) -> Vec<(u32, f64, f64)> {
+    let triangles = || 0..mesh.triangles.len() as u32;
+    let step = triangles().map(|t| mesh.area(t)).sum::<f64>() / f64::from(count);
+    let (mut places, mut sum) = (Vec::new(), 0.0);
+    for t in triangles() {
+        sum += mesh.area(t);
+        while step > 0.0 && places.len() < count as usize && sum > (places.len() as f64 + 0.5) * step {
+            // A two-dimensional golden ratio, folded into the triangle.
+            let k = places.len() as f64;
+            let [u, v] = [0.754_877_666, 0.569_840_291].map(|ratio: f64| (k * ratio).fract());
+            places.push(if u + v > 1.0 { (t, 1.0 - u, 1.0 - v) } else { (t, u, v) });
+        }
+    }
+    places
+}
+
+/// A slab, where nearly all of the body is one: of one thickness, its faces flat beside it.
+fn as_slab(closed: &[Local], all: usize) -> Option<Candidate> {
+    const NEARLY_ALL: f64 = 0.9;
+    let mut sorted: Vec<f32> = closed.iter().map(|l| l.thickness).collect();
+    sorted.sort_by(f32::total_cmp);
+    let middle = *sorted.get(sorted.len() / 2)?;
+    let flat = |l: &&Local| (l.thickness - middle).abs() < 0.05 * middle && l.curvature.abs() * middle < 0.2;
+    let share = closed.iter().filter(flat).count() as f64 / all as f64;
+    (share > NEARLY_ALL).then_some(Candidate { model: ModelName::Slab, calibrated: false, thickness: Some(middle) })
+}
+
+/// Whether it has been found to have no inside.
+fn is_sheet(scene: &Scene, name: &str) -> bool {
+    scene.obstacles().iter().any(|o| o.kind == ObstacleKind::Sheet && o.objects.iter().any(|n| n == name))
+}
+
+/// Whether the program makes this model of the material.
+fn exists(material: &Translucent, candidate: Candidate) -> bool {
+    let Candidate { model, calibrated, thickness } = candidate;
+    Translucent { model, calibrated, thickness, ..material.clone() }.build().is_ok()
+}
+
+fn on_body(shape: &LocalShape, candidate: Candidate, chosen: bool, locals: &[Local], tolerance: f64) -> ModelOnBody {
+    let (mut errors, mut unmeasured): (Vec<ExpectedError>, Option<Unmeasured>) = (Vec::new(), None);
+    for local in locals {
+        match shape.expected(candidate, *local) {
+            Ok((error, _)) => errors.push(error),
+            // What bars all places, such as the medium, before what bars some.
+            Err(why) => {
+                let of_place = matches!(why, Unmeasured::Open | Unmeasured::Thin);
+                unmeasured = unmeasured.filter(|_| of_place).or(Some(why));
+            }
+        }
+    }
+    let measured = errors.len() as f64 / locals.len() as f64;
+    if measured < MOSTLY {
+        errors.clear();
+    }
+    ModelOnBody {
+        model: candidate.model.name(),
+        calibrated: candidate.calibrated,
+        thickness: candidate.thickness,
+        chosen,
+        measured,
+        unmeasured,
+        total: mean(errors.iter().map(|e| e.total)),
+        distribution: mean(errors.iter().map(|e| e.distribution)),
+        far: mean(errors.iter().filter_map(|e| e.far)),
+        beyond: mean(errors.iter().map(|e| f64::from(u8::from(e.distribution > tolerance)))),
     }
 }
 
@@ -176,19 +259,53 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| sum / f64::from(count))
 }
 
-fn name((model, calibrated): (ModelName, bool)) -> String {
-    if calibrated { format!("{} (calibrated)", model.name()) } else { model.name().into() }
-}
-
-/// Thickness [transport mean free paths of `path`] above which a flat sheet is within the tolerance.
-fn trusted_from(shape: &LocalShape, model: (ModelName, bool), tolerance: f64, path: f64) -> Option<f64> {
+/// Thickness [transport mean free paths of `path`] above which a flat sheet is within the tolerance of a model that knows no
+/// thickness.
+fn trusted_from(shape: &LocalShape, candidate: Candidate, tolerance: f64, path: f64) -> Option<f64> {
+    if candidate.model == ModelName::Slab {
+        return None;
+    }
     let wrong = |paths: f64| {
         let some = shape.optics().iter().filter(|k| k.transport_mean_free_path.is_finite());
-        some.map(|k| expected_error(model.0, model.1, &Place::new(k, shape.eta(), paths * path, 0.0)).distribution)
-            .fold(0.0, f64::max)
+        some.map(|k| {
+            let place = Place::new(k, shape.eta(), paths * path, 0.0);
+            expected_error(candidate.model, candidate.calibrated, &place).map_or(f64::INFINITY, |e| e.distribution)
+        })
+        .fold(0.0, f64::max)
             > tolerance
     };
     // From 1000 down in steps of 2 %: the error has one flank.
     let steps = || (0..350).map(|i| 1000.0 * 0.98f64.powi(i));
     if wrong(f64::INFINITY) { None } else { Some(steps().find(|&h| wrong(h)).unwrap_or(0.0)) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{rectangle, sphere};
+    use crate::math::DVec3;
+
+    #[test]
+    fn places_follow_the_area() {
+        // Two triangles, one nine times the other, and one without area between them.
+        let (mut mesh, big) = (Mesh::default(), 3.0);
+        for (x, size) in [(0.0, 1.0), (5.0, 0.0), (10.0, big)] {
+            let at = mesh.positions.len() as u32;
+            let corner = DVec3::new(x, 0.0, 0.0);
+            mesh.positions.extend([corner, corner + DVec3::X * size, corner + DVec3::Y * size]);
+            mesh.triangles.push([at, at + 1, at + 2]);
+        }
+        let places = spread(&mesh, 1000);
+        let in_triangle = |t: u32| places.iter().filter(|p| p.0 == t).count();
+        assert_eq!([in_triangle(0), in_triangle(1), in_triangle(2)], [100, 0, 900]);
+        assert!(places.iter().all(|p| p.1 >= 0.0 && p.2 >= 0.0 && p.1 + p.2 <= 1.0));
+        assert!(spread(&Mesh::default(), 10).is_empty());
+        // The middle of gravity of a sheet and of a ball.
+        for made in [rectangle(DVec3::ZERO, DVec3::X, DVec3::Y), sphere(DVec3::ZERO, 1.0, 24, 48)] {
+            let mesh = made.recentred(DVec3::ZERO);
+            let places = spread(&mesh, POINTS);
+            let middle = places.iter().map(|&(t, u, v)| mesh.point(t, u, v).x).sum::<DVec3>();
+            assert!(middle.length() < 0.05 * places.len() as f64, "{middle}");
+        }
+    }
 }

@@ -2,7 +2,8 @@
 //! round of rays at fixed places, without random numbers: the same for any number of passes.
 
 use crate::film::{Image, Window};
-use crate::integrator::{LocalShape, View};
+use crate::geometry::Curvature;
+use crate::integrator::{Local, LocalShape, View};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, HalfSpace};
 use crate::query::Hit;
@@ -24,9 +25,9 @@ pub enum Seen {
     Place,
     /// Distance along the direction of view [unit] in all channels, through the pixel's middle; infinite without a surface.
     Depth,
-    /// Expected error of the material's model, 0.05 for 5 %; its thickness and mean curvature in transport mean free paths of
-    /// the channel that decides. Means over what is translucent in the pixel; 0 without. See
-    /// [`crate::bssrdf::expected_error`].
+    /// Expected error of the material's model, 0.05 for 5 %, NaN where it has not been measured; thickness in transport mean
+    /// free paths of the channel that decides, NaN where there is no other side, and mean curvature. Means over what is
+    /// translucent in the pixel and has the number; 0 without anything translucent. See [`crate::bssrdf::expected_error`].
     Validity,
     /// Share of the pixel where the camera meets a translucent object first, in all channels.
     Translucent,
@@ -57,7 +58,7 @@ pub fn first_hit(view: View<'_>, window: Window, what: Seen) -> Image {
                 let translucent = matches!(view.scene.materials[object.material].surface, Surface::Translucent(_));
                 translucent.then(|| Rgb::splat(1.0))
             }
-            Seen::Validity => validity(view, shapes[hit.mesh as usize].as_ref()?, &hit),
+            Seen::Validity => Some(validity(view, shapes[hit.mesh as usize].as_ref()?, &hit)),
         }
     };
     let pixel = |pixel: [u32; 2]| {
@@ -66,31 +67,55 @@ pub fn first_hit(view: View<'_>, window: Window, what: Seen) -> Image {
             return look(pixel, [0.5, 0.5]).unwrap_or(Rgb::splat(nothing));
         }
         let place = |k: u32| (k as f32 + 0.5) / SIDE as f32;
-        let (mut sum, mut found) = (Rgb::BLACK, 0);
-        for value in (0..SIDE * SIDE).filter_map(|k| look(pixel, [place(k % SIDE), place(k / SIDE)])) {
-            sum += value;
-            found += 1;
+        let looks = (0..SIDE * SIDE).filter_map(|k| look(pixel, [place(k % SIDE), place(k / SIDE)]));
+        if what == Seen::Validity {
+            return mean_of_numbers(looks);
         }
-        let of = if what == Seen::Validity { found.max(1) } else { SIDE * SIDE };
-        sum * (1.0 / of as f32)
+        looks.fold(Rgb::BLACK, |sum, value| sum + value) * (1.0 / (SIDE * SIDE) as f32)
     };
     let pixels = (0..window.area()).into_par_iter().map(|i| pixel(window.pixel(i))).collect();
     Image { resolution: camera.resolution, window, pixels }
 }
 
-/// The shapes of all translucent objects, each at the number of its object.
-fn shapes(scene: &Scene) -> Vec<Option<LocalShape>> {
-    (0..scene.objects.len() as u32).into_par_iter().map(|object| LocalShape::new(scene, object)).collect()
+/// In each channel the mean of those that are numbers; NaN where none is, 0 of nothing.
+fn mean_of_numbers(values: impl Iterator<Item = Rgb>) -> Rgb {
+    let (mut sums, mut counts, mut all) = ([0.0_f32; 3], [0.0_f32; 3], 0);
+    for value in values {
+        all += 1;
+        for c in (0..3).filter(|&c| !value[c].is_nan()) {
+            sums[c] += value[c];
+            counts[c] += 1.0;
+        }
+    }
+    if all == 0 { Rgb::BLACK } else { Rgb::from_fn(|c| sums[c] / counts[c]) }
 }
 
-fn validity(view: View<'_>, shape: &LocalShape, hit: &Hit) -> Option<Rgb> {
-    let local = shape.at(view, hit.triangle, hit.u, hit.v);
-    let (error, place) = shape.expected_of_its_model(local)?;
-    Some(Rgb([error.distribution, place.thickness.min(FARTHEST), place.curvature].map(|v| v as f32)))
+/// A translucent object with its curvature.
+type Bent = (LocalShape, Curvature);
+
+/// The shapes of all translucent objects, each at the number of its object. Curvature is averaged over the longest transport
+/// mean free path of the three channels.
+fn shapes(scene: &Scene) -> Vec<Option<Bent>> {
+    let of = |object: u32| {
+        let shape = LocalShape::new(scene, object)?;
+        let curvature = Curvature::new(&scene.objects[object as usize].mesh, shape.longest_path() as f32);
+        Some((shape, curvature))
+    };
+    (0..scene.objects.len() as u32).into_par_iter().map(of).collect()
 }
 
-/// What stands for no other side, so that means stay numbers [transport mean free paths].
-const FARTHEST: f64 = 1e6;
+fn validity(view: View<'_>, (shape, curvature): &Bent, hit: &Hit) -> Rgb {
+    let mesh = &view.scene.objects[hit.mesh as usize].mesh;
+    let thickness = shape.thickness(view, &mesh.point(hit.triangle, hit.u, hit.v));
+    let local = Local { thickness, curvature: curvature.at(mesh, hit.triangle, hit.u, hit.v) };
+    match shape.expected(shape.own(), local) {
+        Ok((error, place)) => Rgb([error.distribution, place.thickness, place.curvature].map(|v| v as f32)),
+        Err(_) => {
+            let path = shape.longest_path() as f32;
+            Rgb([f32::NAN, local.thickness / path, local.curvature * path])
+        }
+    }
+}
 
 fn albedos(scene: &Scene) -> Vec<Rgb> {
     let of = |object: &crate::scene::Object| match &scene.materials[object.material].surface {

@@ -2,6 +2,7 @@
 //! are observers called between passes with the clock stopped. Read first: [`run`].
 
 mod first_hit;
+mod framing;
 
 use crate::error::Result;
 use crate::film::{Film, Window};
@@ -9,6 +10,7 @@ use crate::integrator::{CameraRay, Integrator, Tally, View};
 use crate::math::Rgb;
 use crate::sampling::{Pairs, PixelStream, Turn};
 pub use first_hit::{Seen, first_hit};
+pub use framing::{Aim, nothing_in_view, shares};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

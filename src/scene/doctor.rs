@@ -67,13 +67,15 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
         );
     }
     let holes = found.open_edges - found.seam.map_or(0, |seam| seam.closed);
-    if holes > 0 {
-        let effect = if translucent {
-            "the surface is rendered as it is, as if the medium ended at the rim; close the holes for a solid body"
-        } else {
-            "harmless: nothing is inside"
-        };
-        say(translucent, format!("{holes} edges belong to one triangle alone, the rims of holes: {effect}"));
+    // Walls and lamps are sheets: nothing is inside.
+    if holes > 0 && translucent {
+        say(
+            true,
+            format!(
+                "{holes} edges belong to one triangle alone, the rims of holes: the surface is rendered as it is, as if the \
+                 medium ended at the rim; close the holes for a solid body"
+            ),
+        );
     }
     if found.non_manifold_edges > 0 {
         say(

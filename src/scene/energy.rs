@@ -13,14 +13,17 @@ const OTHER_SLAB: f64 = 1.25;
 /// Thickness from which `slab` is to be trusted [transport mean free paths].
 const SLAB_FROM: f64 = 2.0;
 
+/// Why `volume_path` is no remedy for the object; see [`super::Scene::untraceable`].
+type Untraceable<'a> = dyn Fn() -> Option<String> + 'a;
+
 /// What is to say of the energy of an object's model; nothing where it is as good as on a plane.
-pub(super) fn of(t: &Translucent, object: &Object) -> Vec<String> {
+pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>) -> Vec<String> {
     let Ok(model) = t.build() else { return Vec::new() };
     let shape = Shape::of(object);
-    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &model, shape));
+    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &model, shape, untraceable));
     // A thin body is the larger error, and has one remedy.
-    let nature = if sheet.is_none() { by_nature(t, &model) } else { None };
-    sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &model, &shape))).collect()
+    let nature = if sheet.is_none() { by_nature(t, &model, untraceable) } else { None };
+    sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &model, &shape, untraceable))).collect()
 }
 
 /// The sheet, rod or ball that a closed body is most like, from volume V, area S and the mean M of the curvature over it, all of
@@ -59,20 +62,30 @@ fn largest(medium: &Medium, values: impl Iterator<Item = (usize, f64)>) -> Optio
     Some((if medium.is_grey() { String::new() } else { format!(" in {}", CHANNELS[c]) }, value))
 }
 
+/// `volume_path`, where it can trace the body, and what else would do.
+fn remedy(other: Option<String>, untraceable: &Untraceable<'_>) -> String {
+    match (untraceable(), other) {
+        (None, None) => "take method `volume_path`".into(),
+        (None, Some(words)) => format!("take method `volume_path`, or {words}"),
+        (Some(_), Some(words)) => words,
+        (Some(why), None) => format!("`volume_path` would be right, and cannot trace it: {why}"),
+    }
+}
+
 /// A model of a half space lets light out through both faces of a sheet as if each were the only one.
-fn too_thin(t: &Translucent, model: &Model, shape: &Shape) -> Option<String> {
+fn too_thin(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
     if model.name() == ModelName::Slab {
         return None;
     }
     let (eta, optics) = (f64::from(t.medium.eta), ChannelOptics::of(&t.medium));
     let scatters = |k: &ChannelOptics| k.alpha_prime > 0.0;
-    let here = |k: &ChannelOptics| {
-        expected_error(model.name(), t.calibrated, &Place::new(k, eta, shape.thickness, shape.curvature))
-    };
+    let place = |k: &ChannelOptics| Place::new(k, eta, shape.thickness, shape.curvature);
+    // Beyond the table its nearest end.
+    let error =
+        |place: Place| expected_error(model.name(), t.calibrated, &place.nearest_measured()).unwrap_or_default();
+    let here = |k: &ChannelOptics| error(place(k));
     let factor = |k: &ChannelOptics| 1.0 + here(k).total;
-    let plane = |k: &ChannelOptics| {
-        1.0 + expected_error(model.name(), t.calibrated, &Place::new(k, eta, f64::INFINITY, 0.0)).total
-    };
+    let plane = |k: &ChannelOptics| 1.0 + error(Place::new(k, eta, f64::INFINITY, 0.0)).total;
     let each = || optics.iter().enumerate().filter(|(_, k)| scatters(k));
     let thickness = shape.thickness;
     let path = each().map(|(_, k)| k.transport_mean_free_path).fold(0.0, f64::max);
@@ -84,38 +97,43 @@ fn too_thin(t: &Translucent, model: &Model, shape: &Shape) -> Option<String> {
     // Worse than the same medium in a body without end.
     let brighter = largest(&t.medium, each().filter(|(_, k)| factor(k) > plane(k)).map(|(c, k)| (c, factor(k))));
     if let Some((channel, factor)) = brighter.filter(|(_, factor)| *factor > 1.0 + EXCESS) {
-        let slab = if thickness > SLAB_FROM * path {
-            format!(", or model `slab` with thickness = {thickness:.4} if it is flat")
+        let slab = (thickness > SLAB_FROM * path)
+            .then(|| format!("take model `slab` with thickness = {thickness:.4} if it is flat"));
+        let measured = each().all(|(_, k)| place(k) == place(k).nearest_measured());
+        let (about, like) = if measured {
+            ("up to", "")
         } else {
-            String::new()
+            ("some", ", as in the nearest medium and thickness that are measured")
         };
         return Some(format!(
-            "{head}: where all sides are lit it sends out up to {factor:.2} times the light that it should{channel}; take \
-             method `volume_path`{slab}"
+            "{head}: where all sides are lit it sends out {about} {factor:.2} times the light that it should{channel}{like}; {}",
+            remedy(slab, untraceable)
         ));
     }
     let (channel, error) = largest(&t.medium, each().map(|(c, k)| (c, here(k).distribution)))?;
     (thickness < path).then(|| {
         format!(
-            "{head}: {:.0} % of the light comes out in the wrong places{channel}; take method `volume_path`",
-            100.0 * error
+            "{head}: {:.0} % of the light or more comes out in the wrong places{channel}; {}",
+            100.0 * error,
+            remedy(None, untraceable)
         )
     })
 }
 
 /// More than all of the light, on a plane and without any absorption: `directional` as published, and models that add
 /// single scattering to a sum of all other orders that knows nothing of the phase function.
-fn by_nature(t: &Translucent, model: &Model) -> Option<String> {
+fn by_nature(t: &Translucent, model: &Model, untraceable: &Untraceable<'_>) -> Option<String> {
     let clear = Translucent { medium: Medium { sigma_a: Rgb::BLACK, ..t.medium }, model: model.name(), ..t.clone() };
     let total = furnace(&clear.medium, &clear.build().ok()?);
     let (channel, factor) = largest(&t.medium, (0..3).map(|c| (c, f64::from(total[c]))))?;
     (factor > 1.0 + EXCESS).then(|| {
         let name = model.name().name();
         let (why, remedy) = if model.name() == ModelName::Directional {
-            ("as published".to_string(), "set calibrated = true, or take model `beam`")
+            ("as published".to_string(), "set calibrated = true, or take model `beam`".into())
         } else {
             let why = format!("with single scattering beside it, at g = {} and eta = {}", t.medium.g, t.medium.eta);
-            (why, "take method `volume_path`, or model `standard`, which has all orders and no more than all light")
+            let standard = "take model `standard`, which has all orders and no more than all light";
+            (why, remedy(Some(standard.into()), untraceable))
         };
         format!(
             "`{name}` {why} does not conserve energy: of a plane of this medium without absorption {factor:.2} times the \
@@ -138,14 +156,15 @@ fn furnace(medium: &Medium, model: &Model) -> Rgb {
 }
 
 /// A slab of another thickness than the body's.
-fn other_slab(t: &Translucent, model: &Model, shape: &Shape) -> Option<String> {
+fn other_slab(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
     let told = f64::from(t.thickness.filter(|_| model.name() == ModelName::Slab)?);
     let ratio = told / shape.thickness;
     (!(1.0 / OTHER_SLAB..=OTHER_SLAB).contains(&ratio)).then(|| {
         format!(
             "`slab` is told a thickness of {told:.4} units, and the body is some {:.4} units thick: what it reflects and lets \
-             through is that of another sheet; set `thickness`, or take method `volume_path`",
-            shape.thickness
+             through is that of another sheet; {}",
+            shape.thickness,
+            remedy(Some("set `thickness`".into()), untraceable)
         )
     })
 }
@@ -209,13 +228,16 @@ mod tests {
         };
         let (thick, thin) = (cuboid([50.0, 20.0, 50.0]), cuboid([50.0, 0.2, 50.0]));
         for model in [ModelName::Standard, ModelName::Better, ModelName::Beam, ModelName::Normalised, ModelName::Auto] {
-            assert_eq!(super::of(&of(model), &thick), Vec::<String>::new(), "{model:?}");
-            let said = super::of(&of(model), &thin).join("\n");
+            assert_eq!(super::of(&of(model), &thick, &|| None), Vec::<String>::new(), "{model:?}");
+            let said = super::of(&of(model), &thin, &|| None).join("\n");
             assert!(
                 said.contains("model of a half space") && said.contains("0.80 transport mean free paths"),
                 "{said}"
             );
+            assert!(said.ends_with("take method `volume_path`"), "{said}");
+            let crossed = super::of(&of(model), &thin, &|| Some("it passes through itself".into())).join("\n");
+            assert!(crossed.ends_with("`volume_path` would be right, and cannot trace it: it passes through itself"));
         }
-        assert!(super::of(&of(ModelName::Directional), &thick)[0].contains("1.24 times"));
+        assert!(super::of(&of(ModelName::Directional), &thick, &|| None)[0].contains("1.24 times"));
     }
 }

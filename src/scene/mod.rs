@@ -16,6 +16,7 @@ mod obstacles;
 mod options;
 mod precision;
 mod tree;
+mod untraceable;
 mod warnings;
 mod world;
 

@@ -64,20 +64,17 @@ fn outside_diffusion(t: &Translucent) -> Option<String> {
     if !low.is_empty() {
         let low = low.join(", ");
         return Some(format!(
-            "reduced albedo {low}, below 0.5: outside diffusion theory, a BSSRDF model errs; trace it"
+            "reduced albedo {low}, below 0.5: outside diffusion theory, light is absorbed before it spreads and every BSSRDF model errs"
         ));
     }
     (Trust::of(&optics) == Trust::PathTracing).then(|| {
         let albedo = optics.map(|k| format!("{:.3}", k.alpha)).join(", ");
-        format!(
-            "g = {:.3} with albedo {albedo}: light goes on too straight for a BSSRDF model, which errs; trace it",
-            t.medium.g
-        )
+        format!("g = {:.3} with albedo {albedo}: light goes on too straight for a BSSRDF model, which errs", t.medium.g)
     })
 }
 
 fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
-    for (entry, object) in file.objects.iter().zip(&scene.objects) {
+    for ((index, object), entry) in (0..).zip(&scene.objects).zip(&file.objects) {
         let head = format!("{}: object {:?}", entry.at, entry.name);
         let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
         said.extend(found.map(|what| format!("{head}: {what}")));
@@ -87,9 +84,8 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             said.extend(thin(t, (hi - lo).length()).map(|what| format!("{head}: {what}")));
             if file.method.name.is_none_or(|name| name == MethodName::Subsurface) {
                 let material = &scene.materials[object.material].name;
-                said.extend(
-                    energy::of(t, object).into_iter().map(|what| format!("{head}: material {material:?}: {what}")),
-                );
+                let found = energy::of(t, object, &|| scene.untraceable(index));
+                said.extend(found.into_iter().map(|what| format!("{head}: material {material:?}: {what}")));
             }
         }
     }

@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Camera, Environment, Insides, Remark, doctor};
+use super::{Camera, Environment, Insides, Obstacle, ObstacleKind, Remark, doctor};
 use crate::bssrdf::{DirectionalDipole, Model, ModelName, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -94,7 +94,13 @@ pub struct Translucent {
 impl Scene {
     /// What there is to say about the mesh of one of [`Self::objects`]; nothing if it is sound.
     pub fn remarks(&self, object: &Object) -> Vec<Remark> {
-        doctor::remarks(object, &self.materials[object.material].surface)
+        let mut remarks = doctor::remarks(object, &self.materials[object.material].surface);
+        // Of a sheet its obstacle says it all.
+        let sheet = |o: &Obstacle| o.kind == ObstacleKind::Sheet && o.objects.contains(&object.name);
+        if object.findings.open_edges > 0 && self.obstacles().iter().any(sheet) {
+            remarks.retain(|r| !r.text.contains("rims of holes"));
+        }
+        remarks
     }
 
     /// The surface of an object.

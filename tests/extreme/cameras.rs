@@ -1,6 +1,10 @@
 //! Cameras and pictures at the ends of what there is.
 
-use super::harness::{BASE, load, ok, refused, shots, warns, with};
+use super::harness::{BASE, backends, load, ok, refused, shots, warns, with};
+use marmor::film::Window;
+use marmor::integrator::View;
+use marmor::query::{self, Backend};
+use marmor::render::{Aim, nothing_in_view, shares};
 
 fn camera(from: &str, to: &str) -> marmor::Result<marmor::scene::Scene> {
     load(&with(&[(from, to)]))
@@ -77,11 +81,36 @@ fn a_scene_without_objects_refused() {
 }
 
 #[test]
-fn a_camera_that_sees_nothing_ok() {
+fn a_camera_that_sees_nothing_warns() {
     let scene = camera("look_at = [0, 0, 0]", "look_at = [0, 1, 12]").unwrap();
+    for backend in backends() {
+        let aim = what_to_look_at(&scene, backend).unwrap();
+        assert!(aim.object == "body" && aim.degrees > 90.0, "{aim:?}");
+    }
     for shot in shots(&scene) {
         shot.assert_sound();
         let first = shot.image.pixels[0];
         assert!(shot.image.pixels.iter().all(|&p| p == first), "{}: the environment alone", shot.what);
     }
+}
+
+#[test]
+fn a_camera_that_sees_less_than_a_pixel_ok() {
+    let small = with(&[
+        ("look_at = [0, 0, 0]", "look_at = [0.3, 0.5, 0]"),
+        ("radius = 1", "radius = 1e-5"),
+        ("[0, -1.5, 0]", "[0, -900, 0]"),
+    ]);
+    let scene = load(&small).unwrap();
+    for backend in backends() {
+        assert_eq!(what_to_look_at(&scene, backend), None);
+    }
+}
+
+/// What the warning about an empty picture says.
+fn what_to_look_at(scene: &marmor::scene::Scene, backend: Backend) -> Option<Aim> {
+    let rays = query::build(backend, &scene.meshes()).unwrap();
+    let view = View { scene, rays: &*rays };
+    let window = Window::full(scene.camera.resolution);
+    nothing_in_view(view, window, &shares(view, window))
 }

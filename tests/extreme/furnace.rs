@@ -229,17 +229,12 @@ pub fn in_all_models(text: &str, of: Of) {
             let what = format!("{} and single scattering", name.name());
             let mean = by(&scene, Backend::preferred(), Estimator::Cut, true);
             let once = single_on_a_plane(&scene);
-            for c in 0..3 {
-                let ((with, error), (without, e)) = (mean[c], found[0].1[c]);
+            for ((&(with, error), &(without, e)), once) in mean.iter().zip(&found[0].1).zip(once) {
                 assert!(with < most + ERRORS * error, "{what}: {with} +- {error} of {most}");
                 // Counted once, and all of it.
-                let off = with - without - once[c];
-                let allowed = ERRORS * error.hypot(e) + PLANE * once[c];
-                assert!(
-                    of != Of::Plane || off.abs() < allowed,
-                    "{what}: {off} of {} more than that, {allowed}",
-                    once[c]
-                );
+                let off = with - without - once;
+                let allowed = ERRORS * error.hypot(e) + PLANE * once;
+                assert!(of != Of::Plane || off.abs() < allowed, "{what}: {off} of {} more than that, {allowed}", once);
             }
         }
     }

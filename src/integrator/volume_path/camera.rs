@@ -205,21 +205,21 @@ impl<'a> CameraPath<'a> {
         let lights = &self.method.light.lights;
         if lights.has_emitters() {
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
-            if let Some(arrival) = lights.sample_emitter(self.view.scene, at, u) {
-                if self.open(&arrival) {
-                    self.add(self.spectrum.value_outside() * arrival.irradiance * (FRAC_1_PI * self.other));
-                }
+            if let Some(arrival) = lights.sample_emitter(self.view.scene, at, u)
+                && self.open(&arrival)
+            {
+                self.add(self.spectrum.value_outside() * arrival.irradiance * (FRAC_1_PI * self.other));
             }
         }
         if lights.has_suns() {
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
-            if let Some(arrival) = lights.sample_sun(at, u) {
-                if self.open(&arrival) {
-                    // The balance heuristic [VG95] with the cosine by which the path goes on.
-                    let share = arrival.pdf_angle / (arrival.pdf_angle + at.n.dot(arrival.w) * FRAC_1_PI);
-                    let light = arrival.irradiance * (FRAC_1_PI * share * self.other);
-                    self.add(self.spectrum.value_outside() * light);
-                }
+            if let Some(arrival) = lights.sample_sun(at, u)
+                && self.open(&arrival)
+            {
+                // The balance heuristic [VG95] with the cosine by which the path goes on.
+                let share = arrival.pdf_angle / (arrival.pdf_angle + at.n.dot(arrival.w) * FRAC_1_PI);
+                let light = arrival.irradiance * (FRAC_1_PI * share * self.other);
+                self.add(self.spectrum.value_outside() * light);
             }
         }
         if albedo.is_black() || !survives(albedo.max(), &mut self.spectrum, &mut self.draws) {

@@ -230,12 +230,12 @@ impl Facets {
     /// The crossing at one facet.
     fn at(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: Towards) -> Option<Crossing> {
         match p {
-            Towards::Point(p) => self.from_point(mesh, triangle, x, p),
-            Towards::Direction(w) => self.from_direction(mesh, triangle, x, w),
+            Towards::Point(p) => self.crossing_of_point(mesh, triangle, x, p),
+            Towards::Direction(w) => self.crossing_of_direction(mesh, triangle, x, w),
         }
     }
 
-    fn from_point(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: DVec3) -> Option<Crossing> {
+    fn crossing_of_point(&self, mesh: &Mesh, triangle: u32, x: DVec3, p: DVec3) -> Option<Crossing> {
         let corners = mesh.corners(triangle).map(|q| q - x);
         let [a, b, c] = corners;
         let scaled = (b - a).cross(c - a);
@@ -286,7 +286,7 @@ impl Facets {
 
 impl Facets {
     /// Parallel light: Snell's law gives the direction inside at once.
-    fn from_direction(&self, mesh: &Mesh, triangle: u32, x: DVec3, w: Vec3) -> Option<Crossing> {
+    fn crossing_of_direction(&self, mesh: &Mesh, triangle: u32, x: DVec3, w: Vec3) -> Option<Crossing> {
         let [a, b, c] = mesh.corners(triangle).map(|q| q - x);
         let scaled = (b - a).cross(c - a);
         let size = scaled.length();

@@ -64,7 +64,9 @@ impl Spectrum {
     /// A distance with density σ_t exp(-σ_t d) of the hero, from `u` in [0, 1); infinite in a void.
     #[inline]
     pub fn distance(&self, medium: &Coefficients, u: f32) -> f32 {
-        -(1.0 - u).ln() / medium.sigma_t[self.hero]
+        let sigma_t = medium.sigma_t[self.hero];
+        // Not by the quotient alone: u = 0 would make 0/0.
+        if sigma_t > 0.0 { -(1.0 - u).ln() / sigma_t } else { f32::INFINITY }
     }
 
     /// Flown without collision.
@@ -176,5 +178,28 @@ mod tests {
             let error = ((sums[1] / n as f64 - mean * mean) / n as f64).sqrt();
             assert!(((mean - expected) / error).abs() < 6.0, "{c}: {mean} +- {error}, expected {expected}");
         }
+    }
+
+    /// One channel of three has no medium, and no number whatever makes a length that is none.
+    #[test]
+    fn a_void_is_crossed_whatever_the_number() {
+        let medium = Coefficients::new(&Medium {
+            sigma_s: Rgb([0.0, 2.0, 0.0]),
+            sigma_a: Rgb([0.0, 0.5, 1.0]),
+            g: 0.0,
+            eta: 1.0,
+        });
+        for u in [0.0, f32::MIN_POSITIVE, 0.5, 1.0 - f32::EPSILON / 2.0] {
+            let distance = |hero| Spectrum::new(Rgb::WHITE, (hero as f32 + 0.5) / 3.0).distance(&medium, u);
+            assert_eq!(distance(0), f32::INFINITY, "{u}");
+            for hero in [1, 2] {
+                assert!(distance(hero).is_finite() && distance(hero) >= 0.0, "{u}");
+            }
+        }
+        // Through the void and out: nothing is lost in the empty channel, exp(-1) in the absorbing one.
+        let mut path = Spectrum::new(Rgb::WHITE, 0.1);
+        path.fly(1.0);
+        let value = path.value(&medium);
+        assert!(value.is_finite() && value[0] > 0.0, "{value:?}");
     }
 }
