@@ -41,16 +41,17 @@ fn a_report_has_its_page_plots_table_and_records() {
     }
 }
 
-/// A coarse cut of centroids is far off: the page names it, and where its curve ends.
+/// Whether a coarse cut of centroids has come to its floor depends on the machine (`report/verdict.rs` tests the words by made-up
+/// curves); the unbiased cut never has one.
 #[test]
-fn a_method_that_flattens_is_named() {
+fn a_method_without_a_floor_is_not_said_to_have_one() {
     let folder = ball_under_sky();
     let methods = "cut,cluster+cut_error=0.9";
     let arguments = ["converge", "scene.toml", "--methods", methods, "--time-budget", "400ms", "-o", "out"];
     let output = marmor(folder.path(), &[&arguments[..], &["-D", "method.cache_samples=2000"]].concat());
     assert!(output.status.success(), "{}", command::text(&output.stderr));
     let page = fs::read_to_string(folder.path().join("out/index.html")).unwrap();
-    assert!(page.contains("cluster+cut_error=0.9 flattens: relMSE "), "{page:.2000}");
+    assert!(page.contains("cluster+cut_error=0.9") && page.contains("At equal time"), "{page:.2000}");
     assert!(!page.contains(">cut flattens"), "{page:.2000}");
 }
 

@@ -181,7 +181,7 @@ fn the_near_field_is_the_part_that_the_cache_leaves_out() {
         let envelope = Envelope::new(&set.model, &MEDIUM);
         for (radius, direction) in [(2.0, Vec3::new(0.6, 0.8, 0.0)), (8.0, Vec3::new(0.9, 0.3, 0.3)), (20.0, Vec3::X)] {
             let near = NearField::new(&envelope, radius);
-            for [own, cached] in set.near_field(&near, &[set.exit(direction, 0.0)], 12_000) {
+            for [own, cached] in set.near_field(&near, &[set.exit(direction, 0.0)], 16_000) {
                 assert!(apart(own, cached) < 6.0, "{} {radius}: {own:?} {cached:?}", name.name());
                 assert!(own[1] < 0.03 * own[0] && cached[1] < 0.06 * cached[0], "{own:?} {cached:?}");
             }

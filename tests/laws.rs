@@ -285,7 +285,7 @@ fn law_3_energy_furnaces_are_one() {
         for model in ModelName::ALL.into_iter().filter(|model| *model != ModelName::Auto) {
             let mut s = Built::new(1.0, [0.0; 3]);
             s.camera([0.0, 0.0, 0.5], [0.0, 0.0, 0.0], 0.2);
-            s.rectangle("plane", [0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0], "wax");
+            s.rectangle("plane", [0.0, 0.0, 0.0], [2.5, 0.0, 0.0], [0.0, 2.5, 0.0], "wax");
             s.wax("wax", [4.0, 3.0, 2.0], [0.75, 1.0, 1.25], &format!("model = \"{}\"\nthickness = 0.6", model.name()));
             s.text += "[environment]\nradiance = 1\n";
             let scene = s.load();
@@ -293,7 +293,7 @@ fn law_3_energy_furnaces_are_one() {
             let (mut total, claims) = t.build().unwrap().visit(Total);
             assert!(!claims.bounded_energy || total.max() <= 1.0 && total.min() > 0.0, "{}: {total:?}", model.name());
             if !claims.first_order {
-                total = total + SingleScattering::new(&t.medium).total();
+                total += SingleScattering::new(&t.medium).total();
             }
             let by_direction = matches!(model, ModelName::Beam | ModelName::Directional);
             let runs: Vec<Image> = (1..=10)
@@ -315,7 +315,8 @@ fn law_3_energy_furnaces_are_one() {
                 assert!(error < 0.02 * expected, "{what}: too noisy to say anything: {mean} +- {error}");
                 let found = format!("{what}: {mean} +- {error}, expected {expected}");
                 assert!(by_direction || (mean - expected).abs() < 8.0 * error + 1e-4, "{found}");
-                assert!(mean < expected + 8.0 * error + 1e-4 && mean < 1.0 + 8.0 * error, "more than claimed: {found}");
+                let most = if claims.bounded_energy { expected } else { 1.0 };
+                assert!(mean < most + 8.0 * error + 1e-4 && mean < 1.0 + 8.0 * error, "more than claimed: {found}");
             }
         }
         let mut s = Built::new(1.0, [0.0; 3]);

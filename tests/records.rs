@@ -135,7 +135,7 @@ fn a_light_that_is_not_met_is_named_in_place_of_an_error() {
     assert!(said.contains("reached --target-error") && !said.contains("not met"), "{said}");
     assert_eq!(last["not_met"], serde_json::json!([]));
     // Something stands before it: it is waited for, but not for ever.
-    let screen = "[[object]]\nname = \"screen\"\nshape = \"rectangle\"\ncentre = [2, 0, 1.4]\nedge_u = [0.7, 0, 0.7]\nedge_v = [0, 3, 0]\n\
+    let screen = "[[object]]\nname = \"screen\"\nshape = \"rectangle\"\ncentre = [2, 0, 1.4]\nedge_u = [0.7, 0, -0.7]\nedge_v = [0, 3, 0]\n\
                   material = \"wall\"\n";
     let (said, last) = render(two_lamps(1e6, screen), &["--spp", "200"]);
     assert!(said.contains("reached --target-error") && last["pass"].as_u64() > Some(20), "{said}");

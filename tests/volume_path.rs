@@ -248,7 +248,7 @@ fn radial(totals: &Row, bins: &[&Row], paths: u64) -> (f64, u32) {
     let beam = Beam::new(medium, size, size);
     let mut sums = vec![[Sum::default(); 2]; bins.len()];
     beam.run(paths, 3, |left| {
-        let r = f64::from(left.x.truncate().length());
+        let r = left.x.truncate().length();
         // Sides and the bottom are far.
         let bin = bins.partition_point(|b| b.number("r_hi") <= r).min(bins.len() - 1);
         if left.order > 0 && left.x.z.abs() < 1e-3 {

@@ -175,7 +175,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         task.advice = advice.as_ref();
         let finished = match &prepared.method {
             Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
-            Method::Direct(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
+            Method::Direct(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
             Method::Subsurface(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
             Method::VolumePath(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
         };

@@ -17,7 +17,7 @@ pub fn run(prepared: &Prepared, view: View<'_>, job: &Job<'_>, pixel: [u32; 2], 
     }
     let (radiance, tally) = match &prepared.method {
         Method::AmbientOcclusion(method) => render::replay(method, view, job, pixel, pass),
-        Method::Direct(method) => render::replay(method, view, job, pixel, pass),
+        Method::Direct(method) => render::replay(&**method, view, job, pixel, pass),
         Method::Subsurface(method) => render::replay(&**method, view, job, pixel, pass),
         Method::VolumePath(method) => render::replay(&**method, view, job, pixel, pass),
     };

@@ -47,7 +47,7 @@ pub struct MethodArgs {
 /// A method with its tables.
 pub enum Method {
     AmbientOcclusion(AmbientOcclusion),
-    Direct(Direct),
+    Direct(Box<Direct>),
     Subsurface(Box<Subsurface>),
     VolumePath(Box<VolumePath>),
 }
@@ -73,7 +73,7 @@ impl Method {
     ) -> Result<Outcome> {
         match self {
             Self::AmbientOcclusion(m) => render::run(m, view, job, film, observers),
-            Self::Direct(m) => render::run(m, view, job, film, observers),
+            Self::Direct(m) => render::run(&**m, view, job, film, observers),
             Self::Subsurface(m) => render::run(&**m, view, job, film, observers),
             Self::VolumePath(m) => render::run(&**m, view, job, film, observers),
         }
@@ -293,7 +293,7 @@ fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Esti
             radius: options.radius.map_or(f32::INFINITY, |r| r as f32),
             rays: options.rays.unwrap_or(4),
         }),
-        MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)?),
+        MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)?.into()),
         MethodName::Subsurface => {
             let (entry, points) = if as_notes {
                 (EntrySampling::Cosine, Points::Independent)

@@ -302,7 +302,7 @@ pub fn brightness(film: &Film, error: &SelfError, truth: &Truth, set: Option<&[b
     let interval = own.map(|(own, freedom)| {
         let (of_r, freedom_r) = reference.map_or((0.0, 1.0), |(v, f)| (v * value * value, f));
         let all = own + of_r;
-        // [Welch 1947]
+        // [Wel47]
         let freedom = if all > 0.0 { all * all / (own * own / freedom + of_r * of_r / freedom_r) } else { 1.0 };
         let half = student_975(freedom as usize) * all.sqrt();
         [value - half, value + half]

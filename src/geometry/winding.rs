@@ -47,7 +47,7 @@ impl Solid {
     }
 
     /// The share of the surface that does not have the outside before it: it lies inside another part of the solid, in another face of it,
-    /// or looks the wrong way. From [`PROBES`] points, evenly spread over the area. Most of several directions decide, for holes let
+    /// or looks the wrong way. From some points, evenly spread over the area. Most of several directions decide, for holes let
     /// some of them out.
     pub fn hidden_share(&self) -> f64 {
         let area: f64 = self.parts.iter().map(|p| p.area).sum();

@@ -64,16 +64,16 @@ impl Scene {
         let single = file.method.single != Some(false);
         let walks = |t: &Translucent| traced || single && warnings::no_first_order(t).is_some();
         let choice = precision::choose(&scene.objects, &scene.materials, walks);
+        if choice.why_double.is_some() {
+            scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
+        }
+        scene.why_double = choice.why_double;
+        // From here on: the gap between two surfaces depends on what rays are traced in.
         said.extend(warnings::of(file, &scene));
         for (number, what) in choice.beyond {
             let entry = &file.objects[number];
             said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
         }
-        if choice.why_double.is_some() {
-            scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
-        }
-        scene.why_double = choice.why_double;
-        // The gap between two surfaces depends on what rays are traced in.
         let method = file.method.name.unwrap_or_else(|| scene.default_method());
         if matches!(method, MethodName::Subsurface | MethodName::VolumePath) {
             said.extend(scene.obstacles().iter().filter_map(|o| o.warning(method)));

@@ -216,8 +216,7 @@ pub fn in_all_models(text: &str, of: Of) {
             }
         }
         for (what, mean) in &found[1..] {
-            for c in 0..3 {
-                let ((a, da), (b, db)) = (found[0].1[c], mean[c]);
+            for (&(a, da), &(b, db)) in found[0].1.iter().zip(mean) {
                 assert!(
                     (a - b).abs() < ERRORS * da.hypot(db) + 1e-4,
                     "{}: {a} +- {da}; {what}: {b} +- {db}",
