@@ -68,7 +68,7 @@ fn remedy(other: Option<String>, untraceable: &Untraceable<'_>) -> String {
         (None, None) => "take method `volume_path`".into(),
         (None, Some(words)) => format!("take method `volume_path`, or {words}"),
         (Some(_), Some(words)) => words,
-        (Some(why), None) => format!("`volume_path` would be right, and cannot trace it: {why}"),
+        (Some(why), None) => format!("`volume_path` cannot trace it: {why}"),
     }
 }
 
@@ -236,7 +236,7 @@ mod tests {
             );
             assert!(said.ends_with("take method `volume_path`"), "{said}");
             let crossed = super::of(&of(model), &thin, &|| Some("it passes through itself".into())).join("\n");
-            assert!(crossed.ends_with("`volume_path` would be right, and cannot trace it: it passes through itself"));
+            assert!(crossed.ends_with("`volume_path` cannot trace it: it passes through itself"));
         }
         assert!(super::of(&of(ModelName::Directional), &thick, &|| None)[0].contains("1.24 times"));
     }
