@@ -6,14 +6,14 @@
 //!
 //!   measured = mean(w (x - r)^2)    noise = mean(w (x - limit)^2), see `self_error.rs`    bias = mean(w (e - re) (o - ro)),
 //!
-//! the last without noise in its expectation. Its interval is the widest of three, because each knows what the others do not:
-//! the spread between blocks of the picture; what the told noise allows where pixels err together, all of them too; and what the spread of
-//! single samples allows, the film's or the reference's, where a film has not met what the reference has.
+//! the last without noise in its expectation. w ((e - re)^2 - (o - ro)^2) / 2 has no mean and, for equal halves, the variance of
+//! that product, bias or none: its sums over blocks tell how uncertain the bias is. The interval is the widest of this and three
+//! others, because each knows what the others do not: what the told noise allows; noise that all pixels share; and what the
+//! spread of single samples allows in the reference, where it has met what the film has not.
 
 use super::metrics::{Estimate, TRIMMED, student_975};
 use super::self_error::{FEWEST_BLOCKS, FEWEST_FREEDOM, LEVELS, SelfError, State, block_side};
 use super::{Film, Image, Window};
-use crate::math::Rgb;
 use crate::{Error, Result};
 use serde::Serialize;
 
@@ -56,6 +56,10 @@ const UNKNOWN_WIDTH: f64 = 1.0;
 
 /// Told noise is not believed to better than this share.
 const LEAST_WIDTH: f64 = 0.3;
+
+/// Variance of the reference's samples at a pixel over that of the film's, beyond which the film is taken not to have met light
+/// that the reference has. Samples of a low-discrepancy sequence spread more than their mean errs, so they count only then.
+const UNMET: f64 = 4.0;
 
 /// What announces a bias is this times its 95 % interval, 3 standard errors: several methods are judged at once.
 const SURE: f64 = 1.5;
@@ -194,7 +198,9 @@ impl Judged {
             let of_reference = noise * (self.reference_width.exp() - 1.0) + w.min(1.0) * (value * noise).sqrt();
             let below = (value * (1.0 - (-w).exp())).hypot(of_reference);
             let above = (value * (w.exp() - 1.0)).hypot(of_reference);
-            [(value - below).max(0.0), value + above]
+            // What is left of equal numbers is rounding.
+            let low = if value - below > 1e-9 * value { value - below } else { 0.0 };
+            [low, value + above]
         });
         Estimate { value, interval }
     }
@@ -349,10 +355,6 @@ impl Judging<'_> {
         let reference_noise = self.truth.noise_over(&pixels, &self.weights);
         let reference_width = self.truth.known.as_ref().map_or(0.0, |k| k.log_width);
         let shared = self.shared(&pixels);
-        let told = noise.zip(width).map(|(n, w)| {
-            let widest = w.max(reference_width).max(LEAST_WIDTH);
-            ((n.value + reference_noise) * (widest.exp() - 1.0)).max(2.0 * shared.0 * shared.1.powi(2))
-        });
         // Of the noise v is one error: with k of them log(error) is known to 2 / sqrt(k), and 1 / k is (v / noise)^2 at least.
         let by_shared =
             noise.map_or(0.0, |n| if n.value > 0.0 { 2.0 * shared.1 * (shared.0 / n.value).min(1.0) } else { 0.0 });
@@ -363,7 +365,10 @@ impl Judging<'_> {
             reference_width,
             noise: noise.map(|n| n.value),
             width: width.map(|w| w.max(few_pixels_width(squares)).max(by_shared)),
-            bias: told.and_then(|told| self.bias(window, &pixels, told)),
+            bias: noise.zip(width).and_then(|(n, w)| {
+                let widest = w.max(reference_width).max(LEAST_WIDTH);
+                self.bias(&pixels, n.value + reference_noise, widest, shared)
+            }),
             worst_share: if sum > 0.0 { worst.1 / sum } else { 0.0 },
             worst_pixel: window.pixel(worst.0),
         }
@@ -380,20 +385,24 @@ impl Judging<'_> {
         (own + of_reference, student_975(freedom as usize))
     }
 
-    /// `told` is what the told noise allows.
-    fn bias(&self, window: Window, pixels: &[usize], told: f64) -> Option<Bias> {
+    /// `noise` is that of film and reference together, `width` half of the interval of its logarithm.
+    fn bias(&self, pixels: &[usize], noise: f64, width: f64, shared: (f64, f64)) -> Option<Bias> {
         let halves = self.halves.as_ref()?;
         let known = self.truth.known.as_ref().map(|k| &k.halves);
-        let mut single = 0.0;
-        let mut product = |i: usize| {
+        let (mut products, mut single) = (0.0, 0.0);
+        let mut likewise = |i: usize| {
             let (mut sum, mut deviation) = (0.0, 0.0);
             for c in 0..3 {
                 let w = self.weights.at(i, c);
                 let reference =
                     |half| known.map_or(f64::from(self.truth.image.pixels[i][c]), |k| k.state.half(half, i, c));
-                sum += w * (halves.state.half(0, i, c) - reference(0)) * (halves.state.half(1, i, c) - reference(1));
-                let variance = |pixels: &[Rgb]| f64::from(pixels[i][c]);
-                let own = known.map_or(0.0, |k| variance(&k.single.pixels)).max(variance(&halves.single.pixels));
+                let [e, o] = [0, 1].map(|half| halves.state.half(half, i, c) - reference(half));
+                products += w * e * o;
+                sum += w * (e * e - o * o) / 2.0;
+                let variance = |h: &Halves| f64::from(h.single.pixels[i][c]);
+                // Samples spread far more in the reference: it has met what the film has not.
+                let own = known.map_or(0.0, variance);
+                let own = if own > UNMET * variance(halves) { own } else { 0.0 };
                 let passes = |h: &Halves, half: usize| f64::from(h.state.passes[half]);
                 let of_half = |half| own / passes(halves, half) + known.map_or(0.0, |k| own / passes(k, half));
                 deviation += w * (of_half(0) * of_half(1)).sqrt();
@@ -401,11 +410,18 @@ impl Judging<'_> {
             single += deviation * deviation;
             (i, sum)
         };
-        let products: Vec<(usize, f64)> = pixels.iter().map(|&i| product(i)).collect();
+        let likewise: Vec<(usize, f64)> = pixels.iter().map(|&i| likewise(i)).collect();
         let n = (3 * pixels.len()) as f64;
-        let value = products.iter().map(|p| p.1).sum::<f64>() / n;
-        let between = between_blocks(window, &products)?;
-        Some(Bias { value, half_width: between.max(2.0 * single.sqrt() / n).max(told) })
+        let value = products / n;
+        let square = value.max(0.0);
+        let (v, student) = shared;
+        let widths = [
+            between_blocks(self.film.window(), &likewise) / n,
+            2.0 * single.sqrt() / n,
+            (noise * (width.exp() - 1.0)).hypot(width.min(1.0) * (square * noise).sqrt()),
+            2.0 * v * student * student + 2.0 * student * (v * square).sqrt(),
+        ];
+        Some(Bias { value, half_width: widths.into_iter().fold(0.0, f64::max) })
     }
 }
 
@@ -420,32 +436,25 @@ fn few_pixels_width(squares: &[(usize, f64)]) -> f64 {
     student_975((1.0 / share).max(FEWEST_FREEDOM) as usize) * share.sqrt()
 }
 
-/// Half of the 95 % interval of the mean over pixels and channels, from the spread between blocks of up to three sizes: the
-/// widest, since noise of a cache may be as wide as that. None for less than two blocks.
-fn between_blocks(window: Window, values: &[(usize, f64)]) -> Option<f64> {
-    let n = (3 * values.len()) as f64;
-    let mean = values.iter().map(|v| v.1).sum::<f64>() / values.len() as f64;
+/// Half of the 95 % interval of a sum over pixels whose terms have no mean, from its sums over blocks of up to three sizes: the
+/// widest, since noise of a cache may be as wide as that.
+fn between_blocks(window: Window, values: &[(usize, f64)]) -> f64 {
     let mut side = block_side(window);
-    let mut widest: Option<f64> = None;
-    for _ in 0..LEVELS {
+    let mut widest = 0.0_f64;
+    for level in 0..LEVELS {
         let columns = window.width().div_ceil(side);
-        let mut blocks = vec![None; columns * window.height().div_ceil(side)];
-        for &(i, value) in values {
-            let block = &mut blocks[i / window.width() / side * columns + i % window.width() / side];
-            *block.get_or_insert(0.0) += value - mean;
-        }
-        let residuals: Vec<f64> = blocks.into_iter().flatten().collect();
-        let b = residuals.len() as f64;
-        if residuals.len() < 2 || widest.is_some() && residuals.len() < FEWEST_BLOCKS {
+        let mut blocks = vec![0.0; columns * window.height().div_ceil(side)];
+        if level > 0 && blocks.len() < FEWEST_BLOCKS {
             break;
         }
-        let (second, fourth) = residuals.iter().map(|r| r * r).fold((0.0, 0.0), |(s, f), r| (s + r, f + r * r));
+        for &(i, value) in values {
+            blocks[i / window.width() / side * columns + i % window.width() / side] += value;
+        }
+        let squares = blocks.iter().map(|b| b * b);
+        let (second, fourth) = squares.fold((0.0, 0.0), |(sum, fourth), s| (sum + s, fourth + s * s));
         if second > 0.0 {
-            let freedom = (3.0 * second * second / fourth - 2.0).clamp(FEWEST_FREEDOM.min(b - 1.0), b - 1.0);
-            let half = student_975(freedom as usize) * (b / (b - 1.0) * second).sqrt() / n;
-            widest = Some(widest.map_or(half, |w| w.max(half)));
-        } else {
-            widest = widest.or(Some(0.0));
+            let freedom = (3.0 * second * second / fourth - 2.0).max(FEWEST_FREEDOM);
+            widest = widest.max(student_975(freedom as usize) * second.sqrt());
         }
         side *= 2;
     }
@@ -455,7 +464,7 @@ fn between_blocks(window: Window, values: &[(usize, f64)]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::hash;
+    use crate::math::{Rgb, hash};
 
     /// Uniform in -0.5..0.5.
     fn noise(seed: u64, pass: u32, i: usize) -> f32 {

@@ -180,7 +180,7 @@ impl ModelComparison {
                 percent(bias.value)
             )
         } else {
-            format!("no difference is told from noise (below {high:.1} %)")
+            format!("pixel by pixel no difference is told from noise (below {high:.1} %)")
         };
         match model.figures(part).and_then(|f| brightness_text(&f.brightness)) {
             Some(brightness) => format!("{}: {wrong}; {brightness}", model.name),
@@ -369,7 +369,7 @@ mod tests {
         assert!(said.contains("right comes nearest to the reference."), "{said}");
         assert!(
             said.contains(
-                "right: no difference is told from noise (below 1.9 %); as bright in the mean, to -1.0 .. +1.0 %"
+                "right: pixel by pixel no difference is told from noise (below 1.9 %); as bright in the mean, to -1.0 .. +1.0 %"
             ),
             "{said}"
         );
