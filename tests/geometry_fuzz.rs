@@ -209,8 +209,14 @@ fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
     a
 }
 
-/// A scene and what its bodies are to each other.
-fn scene(number: u64) -> (Scene, Vec<Placed>) {
+fn area(mesh: &ObjMesh) -> f64 {
+    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
+    mesh.triangles.iter().map(corners).map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
+}
+
+/// A scene, what its bodies are to each other, and of each pair in one mesh the share of the mesh's area that the smaller one has; 1
+/// for pairs of objects.
+fn scene(number: u64) -> (Scene, Vec<(Placed, f64)>) {
     let mut dice = Dice(number << 20);
     let mut bodies = vec![body(&mut dice, number.is_multiple_of(2))];
     let mut placed = Vec::new();
@@ -218,9 +224,14 @@ fn scene(number: u64) -> (Scene, Vec<Placed>) {
     let mut meshes = vec![vec![0_usize]];
     for i in 0..count {
         // Every kind as often as any other, and first of all where it is alone.
-        let how = if i == 0 { ALL[(number % 9) as usize] } else { ALL[dice.below(9) as usize] };
+        let mut how = if i == 0 { ALL[(number % 9) as usize] } else { ALL[dice.below(9) as usize] };
         if matches!(how, Placed::Face | Placed::Nearly | Placed::Edge) && bodies.last().unwrap().half.is_none() {
-            *bodies.last_mut().unwrap() = Body { centre: bodies.last().unwrap().centre, ..body(&mut dice, true) };
+            if i == 0 {
+                bodies[0] = body(&mut dice, true);
+            } else {
+                // What that body is to the one before stays as it is.
+                how = Placed::Apart;
+            }
         }
         let new = place(&mut dice, bodies.last().unwrap(), how);
         bodies.push(new);
@@ -231,6 +242,12 @@ fn scene(number: u64) -> (Scene, Vec<Placed>) {
             meshes.push(vec![bodies.len() - 1]);
         }
     }
+    let areas: Vec<f64> = bodies.iter().map(|b| area(&b.mesh)).collect();
+    let share = |i: usize| {
+        let mesh = meshes.iter().find(|parts| parts.contains(&i) && parts.contains(&(i + 1)));
+        mesh.map_or(1.0, |parts| areas[i].min(areas[i + 1]) / parts.iter().map(|&b| areas[b]).sum::<f64>())
+    };
+    let placed = placed.into_iter().enumerate().map(|(i, how)| (how, share(i))).collect();
     // Turned, half of them.
     let turn = if dice.below(2) == 0 {
         glam::DMat3::IDENTITY
@@ -266,6 +283,9 @@ fn scene(number: u64) -> (Scene, Vec<Placed>) {
     (Scene::load(&SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap()).unwrap(), placed)
 }
 
+/// Share of the area of a mesh below which parts that are badly placed are no reason to refuse it.
+const MINOR: f64 = 1e-3;
+
 #[test]
 fn no_scene_is_both_accepted_and_wrong() {
     let count = std::env::var("MARMOR_GEOMETRY_SCENES").map_or(270, |n| n.parse().unwrap());
@@ -276,8 +296,10 @@ fn no_scene_is_both_accepted_and_wrong() {
         let refusals = traceable(&scene);
         let what = format!("scene {number}, {placed:?}: {refusals:?}");
         // A body in a cavity is well placed.
-        let in_cavity = |i: usize| placed[i] == Placed::Nested && i > 0 && placed[i - 1] == Placed::Cavity;
-        if (0..placed.len()).any(|i| placed[i].is_bad() && !in_cavity(i)) {
+        let in_cavity = |i: usize| placed[i].0 == Placed::Nested && i > 0 && placed[i - 1].0 == Placed::Cavity;
+        let bad = |i: &usize| placed[*i].0.is_bad() && !in_cavity(*i);
+        // Less than a thousandth of a mesh inside itself is traced; what that loses is held to below.
+        if (0..placed.len()).filter(bad).any(|i| placed[i].1 > MINOR) {
             assert!(!refusals.is_empty(), "accepted: {what}");
             continue;
         }
@@ -292,11 +314,19 @@ fn no_scene_is_both_accepted_and_wrong() {
         let rays = query::build(backends[number as usize % backends.len()], &scene.meshes()).unwrap();
         let options = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed: number };
         let method = VolumePath::new(&scene, options).unwrap();
-        let mut film = Film::new([8, 8], Window::full([8, 8])).unwrap();
-        let cancel = AtomicBool::new(false);
-        let job = Job { seed: number, passes: Some(16), time: None, cancel: &cancel };
-        let outcome = render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-        let walk = outcome.tally.walk;
+        let render = |passes: u32| {
+            let mut film = Film::new([8, 8], Window::full([8, 8])).unwrap();
+            let cancel = AtomicBool::new(false);
+            let job = Job { seed: number, passes: Some(passes), time: None, cancel: &cancel };
+            let view = View { scene: &scene, rays: &*rays };
+            let outcome = render::run(&method, view, &job, &mut film, &mut []).unwrap();
+            (film, outcome.tally.walk)
+        };
+        let (mut film, mut walk) = render(16);
+        if walk.losses.total() as f64 > TOLERATED * walk.walks as f64 {
+            // One of some hundred paths tells no share of a thousandth: many more decide.
+            (film, walk) = render(2048);
+        }
         (paths, lost) = (paths + walk.walks, lost + walk.losses.total());
         assert!(walk.losses.total() as f64 <= TOLERATED * walk.walks as f64, "{:?} in {what}", walk.lost(&scene));
         let pixels: Vec<f64> = film.image().pixels.iter().map(|p| f64::from(p.mean())).collect();
