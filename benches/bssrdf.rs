@@ -4,8 +4,8 @@
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use marmor::bssrdf::{
-    Bssrdf, DirectionColumns, DirectionalDipole, Entry, EntryColumns, Exit, KappaExtinction, Model, ModelVisitor,
-    Partition, PhotonBeamDiffusion, SourceColumns,
+    Bssrdf, DirectionalDipole, Entry, EntryColumns, Exit, KappaExtinction, Layout, Partition, PhotonBeamDiffusion,
+    all_models,
 };
 use marmor::math::{Level, Rgb, Vec3};
 use marmor::optics::Medium;
@@ -19,9 +19,9 @@ fn distances() -> Vec<f32> {
 }
 
 /// Whole milk, red; slab of five transport mean free paths.
-fn models() -> Vec<Model> {
+fn models() -> Vec<Box<dyn Bssrdf>> {
     let medium = Medium::reduced(Rgb::splat(2.55), Rgb::splat(0.0011), 1.3).unwrap();
-    Model::all_for(&medium, true).unwrap()
+    all_models(&medium, true).unwrap()
 }
 
 /// Evaluations per second of `f`, which makes [`COUNT`] of them: the best of twenty runs of some 5 ms.
@@ -52,22 +52,16 @@ fn gathers(medium: &Medium, name: &str, r: &[f32]) {
     let (zero, one, slant) = (column(0.0), column(1.0), column(std::f32::consts::FRAC_1_SQRT_2));
     let down = column(-std::f32::consts::FRAC_1_SQRT_2);
     let directional = DirectionalDipole::new(medium, false);
-    let entries = EntryColumns { x: r, y: &zero, z: &zero, weight: [&one; 3], partition: Partition::NONE };
-    let directions = DirectionColumns { n: [&zero, &zero, &one], w: [&slant, &zero, &down] };
+    let more: [&[f32]; 6] = [&zero, &zero, &one, &slant, &zero, &down];
+    let entries = EntryColumns { x: [r, &zero, &zero], weight: [&one; 3], more, partition: Partition::NONE };
     let beam = PhotonBeamDiffusion::new(medium, true, KappaExtinction::default());
     let w = Vec3::new(slant[0], 0.0, down[0]);
     let t: Vec<f32> = (0..COUNT).map(|i| beam.sample_depth((i * 769 % COUNT) as f32 / COUNT as f32)).collect();
     let x: Vec<f32> = r.iter().zip(&t).map(|(r, t)| r + t * w.x).collect();
     let (z, below): (Vec<f32>, Vec<f32>) = t.iter().map(|t| (t * w.z, -t * w.z)).unzip();
-    let sources = SourceColumns {
-        x: &x,
-        y: &zero,
-        z: &z,
-        below: &below,
-        travelled: &t,
-        weight: [&one; 3],
-        partition: Partition::NONE,
-    };
+    let more: [&[f32]; 6] = [&below, &t, &[], &[], &[], &[]];
+    let sources = EntryColumns { x: [&x, &zero, &z], weight: [&one; 3], more, partition: Partition::NONE };
+    let exits = [Exit { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::Z }];
     let scalar = rate(|| {
         for (&r, &t) in black_box(r).iter().zip(&t) {
             let entry = Entry { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w };
@@ -77,10 +71,10 @@ fn gathers(medium: &Medium, name: &str, r: &[f32]) {
     println!("{:<32} {:>10.1} 1e6 pairs/s, scalar", format!("beam at one depth, {name}"), scalar / 1e6);
     for level in Level::available() {
         let d = rate(|| {
-            black_box(directional.gather_at(level, black_box(Vec3::ZERO), Vec3::Z, entries, directions));
+            black_box(directional.gather_at(level, black_box(&exits), &entries, black_box(&mut [[0.0; 3]])));
         });
         let b = rate(|| {
-            black_box(beam.gather_at(level, black_box(Vec3::ZERO), sources));
+            black_box(beam.gather_at(level, black_box(&exits), &sources, black_box(&mut [[0.0; 3]])));
         });
         println!(
             "{:<32} {:>10.1} 1e6 pairs/s; beam at one depth {:.1}, {level:?}",
@@ -92,18 +86,13 @@ fn gathers(medium: &Medium, name: &str, r: &[f32]) {
 }
 
 /// Evaluations of S_d in three channels, one pair of points after the other.
-struct Pairs<'a>(&'a [f32]);
-
-impl ModelVisitor for Pairs<'_> {
-    type Out = f64;
-    fn visit<B: Bssrdf>(self, model: &B) -> f64 {
-        let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z };
-        rate(|| {
-            for &r in black_box(self.0) {
-                black_box(model.eval(&entry, &Exit { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w: Vec3::Z }));
-            }
-        })
-    }
+fn pairs(model: &dyn Bssrdf, r: &[f32]) -> f64 {
+    let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z };
+    rate(|| {
+        for &r in black_box(r) {
+            black_box(model.eval(&entry, &Exit { x: Vec3::new(r, 0.0, 0.0), n: Vec3::Z, w: Vec3::Z }));
+        }
+    })
 }
 
 fn table() {
@@ -121,10 +110,12 @@ fn table() {
             .into_iter()
             .map(|level| rate(|| radial.exitance_batch_at(level, 0, black_box(&r), black_box(&mut out))))
             .collect();
-        let gathered = model.gather().map(|g| {
-            let entries = EntryColumns { x: &r, y: &zero, z: &zero, weight: [&one; 3], partition: Partition::NONE };
+        let gathered = (model.layout() == Layout::POINTS).then(|| {
+            let (x, more): ([&[f32]; 3], [&[f32]; 6]) = ([&r, &zero, &zero], [&[]; 6]);
+            let entries = EntryColumns { x, weight: [&one; 3], more, partition: Partition::NONE };
+            let exits = [Exit { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::Z }];
             rate(|| {
-                black_box(g.gather(black_box(Vec3::ZERO), entries));
+                black_box(model.gather(black_box(&exits), &entries, black_box(&mut [[0.0; 3]])));
             })
         });
         let shown = levels.iter().map(|v| format!("{:.0}", v / 1e6)).collect::<Vec<_>>().join(" / ");
@@ -138,11 +129,11 @@ fn table() {
             gathered.map_or("-".into(), |v| format!("{:.0}", v / 1e6))
         );
     }
-    for model in Model::all_for(&coloured(), true).unwrap() {
+    for model in all_models(&coloured(), true).unwrap() {
         println!(
             "{:<12} {:>12.2} 1e6 pairs of points per second, three channels",
             model.name().name(),
-            model.visit(Pairs(&r)) / 1e6
+            pairs(&*model, &r) / 1e6
         );
     }
     gathers(&Medium::reduced(Rgb::splat(2.55), Rgb::splat(0.0011), 1.3).unwrap(), "grey", &r);

@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
-use marmor::bssrdf::{Exit, Model, ModelName};
+use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
 use marmor::cache::{Cache, Density, Envelope, Filler, GatherTally, Gatherer, Scratch, Tuning};
 use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
@@ -69,7 +69,7 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn fill(&self, model: &Model, count: u32) -> Cache {
+    fn fill(&self, model: &dyn Bssrdf, count: u32) -> Cache {
         let stream = CacheStream::new(Points::Sobol, 1, 0);
         let filler = Filler {
             scene: self.scene,
@@ -126,9 +126,9 @@ fn copy(cache: &Cache) -> Cache {
 /// Time and noise of all estimators on one cache, by turns.
 fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u32) {
     let thickness = Some(60.0);
-    let model = Model::with_thickness(name, &medium.1, thickness, true).unwrap();
-    let envelope = Envelope::new(&model, &medium.1);
-    let cache = bench.fill(&model, count);
+    let model = name.build(&medium.1, &ModelOptions { thickness, ..ModelOptions::DEFAULT }).unwrap();
+    let envelope = Envelope::new(&*model, &medium.1);
+    let cache = bench.fill(&*model, count);
     let lit = cache.lit.len();
     let start = Instant::now();
     let mut entrants: Vec<Entrant> = Vec::new();
@@ -140,12 +140,12 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         tally: GatherTally::default(),
     };
     for error in [0.003, 0.01, 0.03, 0.1] {
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(error));
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &*model, Tuning::relative(error));
         entrants.push(entrant(format!("cut {error}"), gatherer));
     }
     let built = start.elapsed().as_secs_f64() / 4.0;
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(0.1));
+        let gatherer = Gatherer::new(estimator, copy(&cache), &*model, Tuning::relative(0.1));
         entrants.push(entrant(estimator.name().to_string(), gatherer));
     }
     let tiles = bench.tiles();
@@ -158,7 +158,7 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         let mut sum = |tile: &Vec<Exit>| {
             let mut out = Vec::new();
             let exits = few(tile);
-            all.gather((&model, &envelope), &exits, &vec![0; exits.len()], &mut scratch, &mut tally, &mut out);
+            all.gather((&*model, &envelope), &exits, &vec![0; exits.len()], &mut scratch, &mut tally, &mut out);
             out
         };
         tiles.iter().map(&mut sum).collect()
@@ -177,7 +177,7 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
                     let key = |i: usize| hash(1 + ((round * DRAWS + draw) * 1000 + t as u64) * 10_000 + i as u64);
                     let keys: Vec<u64> = (0..exits.len()).map(key).collect();
                     let start = Instant::now();
-                    e.gatherer.gather((&model, &envelope), &exits, &keys, &mut scratch, &mut e.tally, &mut out);
+                    e.gatherer.gather((&*model, &envelope), &exits, &keys, &mut scratch, &mut e.tally, &mut out);
                     seconds += start.elapsed().as_secs_f64();
                     let step = exits.len() / FEW;
                     for (value, exact) in out.iter().step_by(step).zip(exact) {
@@ -234,10 +234,10 @@ fn main() {
         let largest = std::env::var("MARMOR_BENCH_M").ok().and_then(|m| m.parse().ok()).unwrap_or(100_000);
         for count in [10_000, 100_000, 1_000_000].into_iter().filter(|c| *c <= largest) {
             for name in ["skimmilk", "marble", "skin1"] {
-                compare(&bench, medium(name), ModelName::Standard, count);
+                compare(&bench, medium(name), ModelName::STANDARD, count);
             }
         }
-        for name in [ModelName::Better, ModelName::Normalised, ModelName::Beam, ModelName::Directional] {
+        for name in [ModelName::BETTER, ModelName::NORMALISED, ModelName::BEAM, ModelName::DIRECTIONAL] {
             compare(&bench, medium("skimmilk"), name, 10_000);
         }
     });
@@ -251,24 +251,24 @@ fn timed(bench: &Bench<'_>) {
         .measurement_time(Duration::from_secs(1))
         .configure_from_args();
     let (_, milk) = medium("skimmilk");
-    let model = Model::new(ModelName::Standard, &milk, true);
-    let envelope = Envelope::new(&model, &milk);
+    let model = ModelName::STANDARD.build(&milk, &ModelOptions::DEFAULT).unwrap();
+    let envelope = Envelope::new(&*model, &milk);
     let mut group = criterion.benchmark_group("cache");
     group.throughput(Throughput::Elements(10_000));
-    group.bench_function("fill, samples", |b| b.iter(|| black_box(bench.fill(&model, 10_000))));
-    let cache = bench.fill(&model, 10_000);
+    group.bench_function("fill, samples", |b| b.iter(|| black_box(bench.fill(&*model, 10_000))));
+    let cache = bench.fill(&*model, 10_000);
     let exit = bench.tiles()[0][0];
     let mut out = Vec::new();
     let mut scratch = Scratch::default();
     let mut tally = GatherTally::default();
     group.throughput(Throughput::Elements(cache.lit.len() as u64));
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(0.1));
+        let gatherer = Gatherer::new(estimator, copy(&cache), &*model, Tuning::relative(0.1));
         let mut key = 0;
         group.bench_function(format!("{}, pairs", estimator.name()), |b| {
             b.iter(|| {
                 key += 1;
-                gatherer.gather((&model, &envelope), &[exit], &[hash(key)], &mut scratch, &mut tally, &mut out);
+                gatherer.gather((&*model, &envelope), &[exit], &[hash(key)], &mut scratch, &mut tally, &mut out);
                 black_box(out[0])
             });
         });

@@ -7,7 +7,7 @@
 #[path = "../tests/support/pencils.rs"]
 mod pencils;
 
-use marmor::bssrdf::{Bssrdf, DirectionalDipole, Entry, Exit, Model, ModelName, ModelVisitor};
+use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOptions};
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::{FresnelMoments, Medium};
 use pencils::{Body, Shape, Sum};
@@ -118,34 +118,25 @@ impl Rings {
     }
 }
 
-struct Evaluate<'a>(&'a Rings, f64);
-
-impl ModelVisitor for Evaluate<'_> {
-    type Out = ([[f64; RINGS]; 2], bool);
-    fn visit<B: Bssrdf>(self, model: &B) -> Self::Out {
-        let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::NEG_Z };
-        let flux = self.0.flux(|exit| f64::from(model.eval(&entry, exit)[0]), self.1);
-        (flux, model.claims().first_order)
-    }
+/// Heads of columns, and the models below them.
+fn variants() -> impl Iterator<Item = (&'static str, ModelName, ModelOptions)> {
+    ModelName::models().flat_map(|name| {
+        let variants = if name.takes("calibrated") { vec![false, true] } else { vec![false] };
+        variants.into_iter().map(move |calibrated| {
+            let options = ModelOptions { calibrated, ..ModelOptions::DEFAULT };
+            (name.evidence(&options).unwrap_or(name.name()), name, options)
+        })
+    })
 }
 
 /// In the order of the columns.
-fn models(shape: Shape, medium: &Medium) -> Vec<Option<Model>> {
+fn models(shape: Shape, medium: &Medium) -> Vec<Option<Box<dyn Bssrdf>>> {
     let thickness = match shape {
         Shape::Slab { thickness, half_width } if thickness < half_width => Some(thickness),
         Shape::Slab { .. } => None,
         Shape::Ball { radius } => Some(2.0 * radius),
     };
-    let plain = |name: ModelName| Some(Model::new(name, medium, true));
-    vec![
-        plain(ModelName::Standard),
-        plain(ModelName::Better),
-        plain(ModelName::Beam),
-        plain(ModelName::Directional),
-        Some(Model::Directional(DirectionalDipole::new(medium, true))),
-        plain(ModelName::Normalised),
-        thickness.and_then(|t| Model::with_thickness(ModelName::Slab, medium, Some(t), true).ok()),
-    ]
+    variants().map(|(_, name, options)| name.build(medium, &ModelOptions { thickness, ..options }).ok()).collect()
 }
 
 fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) {
@@ -171,7 +162,9 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
             far_row += ",";
             continue;
         };
-        let (flux, first) = model.visit(Evaluate(&rings, exitance));
+        let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::NEG_Z };
+        let flux = rings.flux(|exit| f64::from(model.eval(&entry, exit)[0]), exitance);
+        let first = model.claims().first_order;
         let (mut wrong, mut total, mut variance) = (straight, -straight, 0.0);
         for (flux, truth) in flux.iter().flatten().zip(truth.iter().flatten()) {
             let [_, one, more] = truth.map(|s| s.mean(paths));
@@ -199,9 +192,9 @@ fn main() {
     let mut shapes = vec![("half", 0.0, Shape::Slab { thickness: 400.0, half_width: 400.0 })];
     shapes.extend(SIZES.map(|h| ("slab", h, Shape::Slab { thickness: h, half_width: 400.0 })));
     shapes.extend(SIZES.map(|r| ("ball", r, Shape::Ball { radius: r })));
-    let names = ["standard", "better", "beam", "directional", "calibrated", "normalised", "slab"];
-    let (columns, far) = (names.map(|n| format!(",{n}_total,{n}_l1")), names.map(|n| format!(",{n}_far")));
-    println!("eta,g,shape,size,alpha_prime,standard_error{}{}", columns.concat(), far.concat());
+    let columns: String = variants().map(|(n, ..)| format!(",{n}_total,{n}_l1")).collect();
+    let far: String = variants().map(|(n, ..)| format!(",{n}_far")).collect();
+    println!("eta,g,shape,size,alpha_prime,standard_error{columns}{far}");
     let medium = |albedo: f64, g: f64, eta: f64| {
         // σ_t′ = 1: σ_t (1 - α g) = 1.
         let sigma_t = 1.0 / (1.0 - albedo * g);

@@ -7,7 +7,7 @@
 #![allow(clippy::print_stdout)] // an example shows its results
 
 use marmor::Result;
-use marmor::bssrdf::{Bssrdf, Entry, Exit, Model, ModelName, ModelVisitor, StandardDipole};
+use marmor::bssrdf::{Bssrdf as _, Entry, Exit, ModelName, ModelOptions, StandardDipole};
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::{self, AlbedoCurve, AlbedoLaw, ChannelOptics, FresnelMoments, Medium, Trust};
 use std::f64::consts::PI;
@@ -18,35 +18,26 @@ fn main() -> Result<()> {
     let medium = marble.medium(1.0);
     println!("{} from [{}], eta {}", marble.name, marble.source, marble.eta);
 
-    evaluate(&medium);
+    evaluate(&medium)?;
     sample_a_radius(&medium);
     invert_a_colour()?;
     Ok(())
 }
 
 /// S_d between two points of a plane, by every model of a half space.
-fn evaluate(medium: &Medium) {
+fn evaluate(medium: &Medium) -> Result<()> {
     let (up, r) = (Vec3::Z, 1.0);
     // Light arrives along the normal; `w` is its direction *inside*, after refraction.
     let entry = Entry { x: Vec3::ZERO, n: up, w: -up };
     let exit = Exit { x: Vec3::new(r, 0.0, 0.0), n: up, w: up };
     println!("\nS_d at r = {r} mm [1/(mm² sr)]:");
-    for name in ModelName::ALL.into_iter().filter(|m| !matches!(m, ModelName::Slab | ModelName::Auto)) {
-        let value = Model::new(name, medium, true).visit(Eval(&entry, &exit));
+    for name in ModelName::half_spaces() {
+        let value = name.build(medium, &ModelOptions::DEFAULT)?.eval(&entry, &exit);
         println!("  {:<12} {:>10.3e} {:>10.3e} {:>10.3e}", name.name(), value[0], value[1], value[2]);
     }
     let trust = Trust::of(&ChannelOptics::of(medium));
     println!("models to trust for this medium: {trust}");
-}
-
-/// Work that is generic over the model's own type, so that inner loops are compiled for each model.
-struct Eval<'a>(&'a Entry, &'a Exit);
-
-impl ModelVisitor for Eval<'_> {
-    type Out = Rgb;
-    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-        model.eval(self.0, self.1)
-    }
+    Ok(())
 }
 
 /// Exit distances with density proportional to r M(r): the profile of the green channel is tabulated, summed, and

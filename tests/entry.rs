@@ -1,7 +1,7 @@
 //! What enters a body: every density of points and of directions, and the near field, give the same light.
 #![allow(clippy::unwrap_used)] // a scene that does not load has failed
 
-use marmor::bssrdf::{Bssrdf, Exit, Model, ModelName, ModelVisitor};
+use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
 use marmor::cache::{CachedSample, Clock, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
 use marmor::geometry::AreaTable;
 use marmor::light::Lights;
@@ -30,7 +30,7 @@ struct Set {
     rays: Box<dyn RayQuery>,
     lights: Lights,
     table: AreaTable,
-    model: Model,
+    model: Box<dyn Bssrdf>,
 }
 
 impl Set {
@@ -39,7 +39,7 @@ impl Set {
         let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
         let rays = query::build(Backend::preferred(), &meshes).unwrap();
         let (lights, table) = (Lights::new(scene), AreaTable::new(&scene.objects[0].mesh).unwrap());
-        Self { rays, lights, table, model: Model::new(name, &MEDIUM, true), scene }
+        Self { rays, lights, table, model: name.build(&MEDIUM, &ModelOptions::DEFAULT).unwrap(), scene }
     }
 
     fn filler<'a>(&'a self, stream: &'a CacheStream, density: &'a Density, cosine_share: f32) -> Filler<'a> {
@@ -49,7 +49,7 @@ impl Set {
             lights: &self.lights,
             object: 0,
             table: &self.table,
-            model: &self.model,
+            model: &*self.model,
             eta: MEDIUM.eta,
             sampling: EntrySampling::Light,
             cosine_share,
@@ -85,7 +85,7 @@ fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
 #[test]
 fn directions_by_light_and_by_cosine_bring_the_same_flux_together_and_alone() {
     for (height, environment) in [(5.2, ""), (9.0, ""), (9.0, "[environment]\nradiance = 0.3\n")] {
-        let set = Set::new(scene(height, environment), ModelName::Standard);
+        let set = Set::new(scene(height, environment), ModelName::STANDARD);
         let even = Density::even();
         let shares: &[f32] = if environment.is_empty() { &[0.0, 0.2, 0.5] } else { &[0.3, 0.5, 0.7] };
         let found: Vec<[f64; 2]> = shares.iter().map(|&share| flux(&set, &even, share)).collect();
@@ -98,20 +98,20 @@ fn directions_by_light_and_by_cosine_bring_the_same_flux_together_and_alone() {
 
 #[test]
 fn a_lamp_nearer_than_it_is_wide_takes_some_directions_by_the_cosine_and_has_less_noise_by_it() {
-    let near = Set::new(scene(5.2, ""), ModelName::Standard);
+    let near = Set::new(scene(5.2, ""), ModelName::STANDARD);
     let share = near.lights.cosine_share(near.scene.objects[0].mesh.bounds().unwrap());
     assert!(share > 0.2 && share <= 0.5, "{share}");
     let even = Density::even();
     let noise = [0.0, share].map(|share| flux(&near, &even, share)[1]);
     assert!(noise[1] < noise[0], "{noise:?}");
-    let far = Set::new(scene(30.0, ""), ModelName::Standard);
+    let far = Set::new(scene(30.0, ""), ModelName::STANDARD);
     assert!(far.lights.cosine_share(far.scene.objects[0].mesh.bounds().unwrap()) == 0.0);
 }
 
 #[test]
 fn samples_spread_by_what_is_seen_bring_the_same_flux_as_an_even_spread() {
-    let set = Set::new(scene(9.0, ""), ModelName::Standard);
-    let envelope = Envelope::new(&set.model, &MEDIUM);
+    let set = Set::new(scene(9.0, ""), ModelName::STANDARD);
+    let envelope = Envelope::new(&*set.model, &MEDIUM);
     let (even, stream) = (Density::even(), CacheStream::new(Points::Sobol, 99, 0));
     let points = seen(set.scene, &*set.rays);
     assert!(points[0].len() > 100 && points[1].len() < points[0].len());
@@ -124,18 +124,12 @@ fn samples_spread_by_what_is_seen_bring_the_same_flux_as_an_even_spread() {
 }
 
 /// Σ S_d near flux over samples of a cache.
-struct Near<'a>(&'a NearField, &'a Model, &'a [CachedSample], &'a Exit);
-
-impl ModelVisitor for Near<'_> {
-    type Out = f64;
-    fn visit<B: Bssrdf>(self, model: &B) -> f64 {
-        let Self(near, of, samples, exit) = self;
-        let each = samples.iter().map(|s| {
-            let share = near.partition.share(of.apart2(&s.entry, s.depth, exit));
-            f64::from((model.eval_cached(&s.entry, s.depth, exit, 0.0) * s.flux * share).mean())
-        });
-        each.sum()
-    }
+fn near_part(near: &NearField, model: &dyn Bssrdf, samples: &[CachedSample], exit: &Exit) -> f64 {
+    let each = samples.iter().map(|s| {
+        let share = near.partition.share(model.apart2(&s.entry, s.depth, exit));
+        f64::from((model.eval_cached(&s.entry, s.depth, exit, 0.0) * s.flux * share).mean())
+    });
+    each.sum()
 }
 
 impl Set {
@@ -166,7 +160,7 @@ impl Set {
         let own: Vec<Vec<Rgb>> = (0..runs).map(own).collect();
         let caches: Vec<_> = (0..300).map(|i| filler.fill(i * 2000, 2000, &mut RayTally::default())).collect();
         let both = |(i, exit): (usize, &Exit)| {
-            let cached = caches.iter().map(|c| self.model.visit(Near(near, &self.model, &c.lit, exit)) / 2000.0);
+            let cached = caches.iter().map(|c| near_part(near, &*self.model, &c.lit, exit) / 2000.0);
             [statistics(own.iter().map(|sums| f64::from(sums[i].mean()))), statistics(cached)]
         };
         exits.iter().enumerate().map(both).collect()
@@ -176,9 +170,9 @@ impl Set {
 /// On a ball smaller than the near field its lines meet two and more sheets at all angles.
 #[test]
 fn the_near_field_is_the_part_that_the_cache_leaves_out() {
-    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
+    for name in [ModelName::STANDARD, ModelName::BEAM, ModelName::DIRECTIONAL] {
         let set = Set::new(scene(9.0, ""), name);
-        let envelope = Envelope::new(&set.model, &MEDIUM);
+        let envelope = Envelope::new(&*set.model, &MEDIUM);
         for (radius, direction) in [(2.0, Vec3::new(0.6, 0.8, 0.0)), (8.0, Vec3::new(0.9, 0.3, 0.3)), (20.0, Vec3::X)] {
             let near = NearField::new(&envelope, radius);
             for [own, cached] in set.near_field(&near, &[set.exit(direction, 0.0)], 16_000) {
@@ -192,8 +186,8 @@ fn the_near_field_is_the_part_that_the_cache_leaves_out() {
 /// Exits share what their lines find: side by side, at the rim of one another's near field, beyond it, and with other normals.
 #[test]
 fn exits_that_share_their_lines_have_each_its_own_near_field() {
-    let set = Set::new(scene(9.0, ""), ModelName::Standard);
-    let envelope = Envelope::new(&set.model, &MEDIUM);
+    let set = Set::new(scene(9.0, ""), ModelName::STANDARD);
+    let envelope = Envelope::new(&*set.model, &MEDIUM);
     let near = NearField::new(&envelope, 2.0);
     let exits: Vec<Exit> = [0.0, 0.02, 0.1, 0.35, 0.4, 1.2]
         .iter()

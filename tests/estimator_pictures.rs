@@ -85,14 +85,14 @@ fn set(scene: &mut Scene, model: ModelName) {
         if let Surface::Translucent(t) = &mut material.surface {
             let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
             t.model = model;
-            t.thickness = (model == ModelName::Slab).then_some(10.0 * longest);
+            t.thickness = model.takes("thickness").then_some(10.0 * longest);
         }
     }
 }
 
 /// All models and estimators on a scene; a factor of 1.05 must be refused.
 fn compare(scene: &mut Scene, passes: u32, samples: u32) {
-    for model in ModelName::ALL.into_iter().filter(|m| *m != ModelName::Auto) {
+    for model in ModelName::models() {
         set(scene, model);
         let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
         let rays = query::build(Backend::preferred(), &meshes).unwrap();

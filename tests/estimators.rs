@@ -1,7 +1,7 @@
 //! Every estimator has the mean of the plain sum over the same samples, for every model.
 #![allow(clippy::unwrap_used)] // a test that cannot make its model has failed
 
-use marmor::bssrdf::{Bssrdf, Entry, Exit, Model, ModelName, ModelVisitor};
+use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOptions};
 use marmor::cache::{Cache, CachedSample, Envelope, GatherTally, Gatherer, Scratch, Tuning};
 use marmor::math::{Rgb, Vec3, hash, unit_f32};
 use marmor::optics::Medium;
@@ -20,7 +20,7 @@ fn number(i: u64, dimension: u64) -> f32 {
 }
 
 /// Samples on a sphere of radius 8 with uneven, coloured flux and oblique directions.
-fn cache(model: &Model, count: u64) -> Cache {
+fn cache(model: &dyn Bssrdf, count: u64) -> Cache {
     let sample = |i| {
         let z = 2.0 * number(i, 0) - 1.0;
         let (sin, cos) = (std::f32::consts::TAU * number(i, 1)).sin_cos();
@@ -46,26 +46,21 @@ fn exits() -> [Exit; 3] {
 }
 
 /// The sum written out, one evaluation a sample.
-struct Exact<'a>(&'a Cache, &'a Exit);
-
-impl ModelVisitor for Exact<'_> {
-    type Out = [f64; 3];
-    fn visit<B: Bssrdf>(self, model: &B) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for s in &self.0.lit {
-            let value = model.eval_cached(&s.entry, s.depth, self.1, 0.0);
-            for c in 0..3 {
-                sum[c] += f64::from(value[c]) * f64::from(s.flux[c]) / f64::from(self.0.attempted);
-            }
+fn exact_sum(model: &dyn Bssrdf, cache: &Cache, exit: &Exit) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for s in &cache.lit {
+        let value = model.eval_cached(&s.entry, s.depth, exit, 0.0);
+        for c in 0..3 {
+            sum[c] += f64::from(value[c]) * f64::from(s.flux[c]) / f64::from(cache.attempted);
         }
-        sum
     }
+    sum
 }
 
 /// One exit alone.
 fn gather(
     gatherer: &Gatherer,
-    model: &Model,
+    model: &dyn Bssrdf,
     envelope: &Envelope,
     exit: &Exit,
     key: u64,
@@ -79,13 +74,13 @@ fn gather(
 
 /// Worst deviation of the mean of `runs` estimates from the exact sum, in standard errors; `off` is a planted factor.
 /// Errors of f32 sums are counted as part of the standard error.
-fn deviation(estimator: Estimator, model: &Model, medium: &Medium, count: u64, runs: u64, off: f64) -> f64 {
+fn deviation(estimator: Estimator, model: &dyn Bssrdf, medium: &Medium, count: u64, runs: u64, off: f64) -> f64 {
     let cache = cache(model, count);
     let envelope = Envelope::new(model, medium);
     let gatherer = Gatherer::new(estimator, copy(&cache), model, Tuning::relative(0.1));
     let (mut scratch, mut tally, mut worst) = (Scratch::default(), GatherTally::default(), 0.0_f64);
     for (at, exit) in exits().iter().enumerate() {
-        let exact = model.visit(Exact(&cache, exit));
+        let exact = exact_sum(model, &cache, exit);
         let (mut sum, mut squares) = ([0.0; 3], [0.0; 3]);
         for run in 0..runs {
             let key = hash(hash(run + 1) + at as u64);
@@ -108,14 +103,8 @@ fn deviation(estimator: Estimator, model: &Model, medium: &Medium, count: u64, r
     worst
 }
 
-fn models(medium: &Medium) -> Vec<Model> {
-    let mut models = vec![Model::with_thickness(ModelName::Slab, medium, Some(50.0), true).unwrap()];
-    for name in ModelName::ALL {
-        if !matches!(name, ModelName::Slab | ModelName::Auto) {
-            models.push(Model::new(name, medium, true));
-        }
-    }
-    models
+fn models(medium: &Medium) -> Vec<Box<dyn Bssrdf>> {
+    ModelName::models().map(|name| name.build(medium, &ModelOptions::thick(50.0)).unwrap()).collect()
 }
 
 #[test]
@@ -135,7 +124,7 @@ fn every_estimator_has_the_mean_of_the_sum() {
                     // Biased: a test of its own.
                     Estimator::Cluster => continue,
                 };
-                let found = deviation(estimator, &model, &medium, count, runs, 1.0);
+                let found = deviation(estimator, &*model, &medium, count, runs, 1.0);
                 assert!(found < 6.0, "{} {}: {found}", estimator.name(), model.name().name());
             }
         }
@@ -146,7 +135,7 @@ fn every_estimator_has_the_mean_of_the_sum() {
 fn a_mean_that_is_two_percent_off_is_refused() {
     for model in models(&COLOURED) {
         for off in [0.98, 1.02] {
-            let found = deviation(Estimator::Cut, &model, &COLOURED, 1500, 600, off);
+            let found = deviation(Estimator::Cut, &*model, &COLOURED, 1500, 600, off);
             assert!(found > 6.0, "{}: {found}", model.name().name());
         }
     }
@@ -154,16 +143,16 @@ fn a_mean_that_is_two_percent_off_is_refused() {
 
 #[test]
 fn caches_of_a_few_samples_and_of_none_are_summed() {
-    let model = Model::new(ModelName::Standard, &COLOURED, true);
-    let envelope = Envelope::new(&model, &COLOURED);
+    let model = ModelName::STANDARD.build(&COLOURED, &ModelOptions::DEFAULT).unwrap();
+    let envelope = Envelope::new(&*model, &COLOURED);
     let mut scratch = Scratch::default();
     for count in [0, 1, 7, 8, 9, 1025] {
-        let cache = cache(&model, count);
+        let cache = cache(&*model, count);
         for &estimator in &[Estimator::All, Estimator::Cut] {
-            let exact = model.visit(Exact(&cache, &exits()[0]));
-            let gatherer = Gatherer::new(estimator, copy(&cache), &model, Tuning::relative(1e-4));
+            let exact = exact_sum(&*model, &cache, &exits()[0]);
+            let gatherer = Gatherer::new(estimator, copy(&cache), &*model, Tuning::relative(1e-4));
             let mut tally = GatherTally::default();
-            let value = gather(&gatherer, &model, &envelope, &exits()[0], 5, &mut scratch, &mut tally);
+            let value = gather(&gatherer, &*model, &envelope, &exits()[0], 5, &mut scratch, &mut tally);
             for c in 0..3 {
                 assert!((f64::from(value[c]) - exact[c]).abs() <= 1e-3 * exact[c], "{count} {}", estimator.name());
             }
@@ -174,17 +163,17 @@ fn caches_of_a_few_samples_and_of_none_are_summed() {
 
 #[test]
 fn a_cut_visits_few_of_many_samples_and_its_noise_follows_the_error_asked_for() {
-    let model = Model::new(ModelName::Standard, &COLOURED, true);
-    let envelope = Envelope::new(&model, &COLOURED);
-    let cache = cache(&model, 20_000);
-    let exact = model.visit(Exact(&cache, &exits()[1]));
+    let model = ModelName::STANDARD.build(&COLOURED, &ModelOptions::DEFAULT).unwrap();
+    let envelope = Envelope::new(&*model, &COLOURED);
+    let cache = cache(&*model, 20_000);
+    let exact = exact_sum(&*model, &cache, &exits()[1]);
     let mut scratch = Scratch::default();
     let noise = [0.01, 0.1].map(|error| {
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(error));
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &*model, Tuning::relative(error));
         let mut tally = GatherTally::default();
         let mut squares = 0.0;
         for run in 0..100 {
-            let value = gather(&gatherer, &model, &envelope, &exits()[1], hash(run), &mut scratch, &mut tally);
+            let value = gather(&gatherer, &*model, &envelope, &exits()[1], hash(run), &mut scratch, &mut tally);
             squares += (f64::from(value[0]) / exact[0] - 1.0).powi(2) / 100.0;
         }
         assert!(tally.evaluated < 100 * 4000, "{tally:?}");
@@ -196,11 +185,11 @@ fn a_cut_visits_few_of_many_samples_and_its_noise_follows_the_error_asked_for() 
 /// Exits side by side share a cut and its draws; each has the mean of its own sum.
 #[test]
 fn a_group_of_exits_has_the_means_of_its_sums() {
-    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
-        let model = Model::new(name, &MILD, true);
-        let envelope = Envelope::new(&model, &MILD);
-        let cache = cache(&model, 3000);
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(0.1));
+    for name in [ModelName::STANDARD, ModelName::BEAM, ModelName::DIRECTIONAL] {
+        let model = name.build(&MILD, &ModelOptions::DEFAULT).unwrap();
+        let envelope = Envelope::new(&*model, &MILD);
+        let cache = cache(&*model, 3000);
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &*model, Tuning::relative(0.1));
         // Forty beside each other and five elsewhere.
         let exits: Vec<Exit> = (0..45_u64)
             .map(|i| {
@@ -211,10 +200,10 @@ fn a_group_of_exits_has_the_means_of_its_sums() {
             .collect();
         let (mut scratch, mut tally, mut out) = (Scratch::default(), GatherTally::default(), Vec::new());
         let (runs, mut sums) = (300_u64, vec![[[0.0_f64; 3]; 2]; exits.len()]);
-        let exact: Vec<[f64; 3]> = exits.iter().map(|exit| model.visit(Exact(&cache, exit))).collect();
+        let exact: Vec<[f64; 3]> = exits.iter().map(|exit| exact_sum(&*model, &cache, exit)).collect();
         for run in 0..runs {
             let keys: Vec<u64> = (0..exits.len() as u64).map(|i| hash(1 + run * 1000 + i)).collect();
-            gatherer.gather((&model, &envelope), &exits, &keys, &mut scratch, &mut tally, &mut out);
+            gatherer.gather((&*model, &envelope), &exits, &keys, &mut scratch, &mut tally, &mut out);
             for ((sum, value), exact) in sums.iter_mut().zip(&out).zip(&exact) {
                 for c in 0..3 {
                     let apart = f64::from(value[c]) - exact[c];
@@ -239,16 +228,16 @@ fn a_group_of_exits_has_the_means_of_its_sums() {
 /// Centroids are biased, the less the finer the cut; at the finest it is the plain sum.
 #[test]
 fn clusters_come_near_the_sum() {
-    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
-        let model = Model::new(name, &MILD, true);
-        let envelope = Envelope::new(&model, &MILD);
-        let cache = cache(&model, 3000);
+    for name in [ModelName::STANDARD, ModelName::BEAM, ModelName::DIRECTIONAL] {
+        let model = name.build(&MILD, &ModelOptions::DEFAULT).unwrap();
+        let envelope = Envelope::new(&*model, &MILD);
+        let cache = cache(&*model, 3000);
         let (mut scratch, mut tally) = (Scratch::default(), GatherTally::default());
         let exit = &exits()[1];
-        let exact = model.visit(Exact(&cache, exit));
+        let exact = exact_sum(&*model, &cache, exit);
         let bias = [1e-6, 0.03].map(|error| {
-            let gatherer = Gatherer::new(Estimator::Cluster, copy(&cache), &model, Tuning::relative(error));
-            let draws = [1, 2].map(|key| gather(&gatherer, &model, &envelope, exit, key, &mut scratch, &mut tally));
+            let gatherer = Gatherer::new(Estimator::Cluster, copy(&cache), &*model, Tuning::relative(error));
+            let draws = [1, 2].map(|key| gather(&gatherer, &*model, &envelope, exit, key, &mut scratch, &mut tally));
             assert!(draws[0] == draws[1], "nothing is left to chance");
             (f64::from(draws[0][0]) / exact[0] - 1.0).abs()
         });
@@ -259,18 +248,18 @@ fn clusters_come_near_the_sum() {
 /// The tree is built by several tasks, and nothing of it may depend on who does what.
 #[test]
 fn the_same_bits_come_out_for_any_number_of_threads() {
-    for name in [ModelName::Standard, ModelName::Beam, ModelName::Directional] {
-        let model = Model::new(name, &COLOURED, true);
-        let envelope = Envelope::new(&model, &COLOURED);
-        let cache = cache(&model, 20_000);
+    for name in [ModelName::STANDARD, ModelName::BEAM, ModelName::DIRECTIONAL] {
+        let model = name.build(&COLOURED, &ModelOptions::DEFAULT).unwrap();
+        let envelope = Envelope::new(&*model, &COLOURED);
+        let cache = cache(&*model, 20_000);
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
-                let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &model, Tuning::relative(0.1));
+                let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &*model, Tuning::relative(0.1));
                 let mut scratch = Scratch::default();
                 let mut tally = GatherTally::default();
                 exits()
-                    .map(|e| gather(&gatherer, &model, &envelope, &e, 9, &mut scratch, &mut tally).0.map(f32::to_bits))
+                    .map(|e| gather(&gatherer, &*model, &envelope, &e, 9, &mut scratch, &mut tally).0.map(f32::to_bits))
             })
         };
         let one = run(1);

@@ -8,7 +8,7 @@
 #![allow(clippy::unwrap_used)] // a fixture that cannot be made is a failed test
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
-use marmor::bssrdf::{KappaExtinction, ModelName, WidthFit};
+use marmor::bssrdf::{ModelName, ModelOptions, WidthFit};
 use marmor::film::{Checkpoint, Film, Identity, Image, Metadata, PngOptions, Window, read_attributes, save};
 use marmor::geometry::{examine, load_obj, mended};
 use marmor::integrator::{Direct, Subsurface, SubsurfaceOptions};
@@ -366,13 +366,11 @@ fn eval() {
         let text = String::from_utf8_lossy(bytes);
         let (mut good, mut out) = (false, String::new());
         turn += 1;
-        let models = [ModelName::ALL[turn % ModelName::ALL.len()], ModelName::Standard];
+        let models = [ModelName::ALL[turn % ModelName::ALL.len()], ModelName::STANDARD];
         for model in models {
             let options = BatchOptions {
                 model,
-                exit_normalisation: turn % 3 > 0,
-                calibrated: false,
-                kappa: KappaExtinction::Reduced,
+                made: ModelOptions { exit_normalisation: turn % 3 > 0, ..ModelOptions::DEFAULT },
                 width: WidthFit::DiffusionLength,
                 transmitted: false,
                 clamped: turn % 2 > 0,

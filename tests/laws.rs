@@ -2,7 +2,7 @@
 //! 4: order (files and signals: tests/interrupted.rs). 5: honesty (see also tests/extreme/).
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
-use marmor::bssrdf::{Bssrdf, Claims, ModelName, ModelVisitor, SingleScattering};
+use marmor::bssrdf::{ModelName, SingleScattering};
 use marmor::film::{Counts, Film, Image, Window};
 use marmor::integrator::{
     AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions,
@@ -191,7 +191,7 @@ fn set_model(scene: &mut Scene, model: ModelName) {
             t.model = model;
             // Some four mean free paths of the thinnest channel: a slab that every medium here allows.
             let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
-            t.thickness = (model == ModelName::Slab).then_some(4.0 * longest);
+            t.thickness = model.takes("thickness").then_some(4.0 * longest);
         }
     }
 }
@@ -199,7 +199,7 @@ fn set_model(scene: &mut Scene, model: ModelName) {
 /// The film of every method, model and estimator by name.
 fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -> Vec<(String, Film)> {
     let mut all = Vec::new();
-    set_model(scene, ModelName::Standard);
+    set_model(scene, ModelName::STANDARD);
     for (name, radius) in [("ambient_occlusion", f32::INFINITY), ("ambient_occlusion, radius", radius as f32)] {
         let method = AmbientOcclusion { radius, rays: 2 };
         all.push((name.to_string(), film(&method, scene, backend, passes.clone()).0));
@@ -211,8 +211,8 @@ fn films(scene: &mut Scene, backend: Backend, passes: Range<u32>, radius: f64) -
         all.push(("volume_path".into(), film(&method, scene, backend, passes.clone()).0));
     }
     // Every model with one estimator, every estimator with one model.
-    let pairs = ModelName::ALL.into_iter().enumerate().map(|(i, model)| (model, ESTIMATORS[i % ESTIMATORS.len()]));
-    for (model, (estimator, samples)) in pairs.chain(ESTIMATORS.map(|e| (ModelName::Better, e))) {
+    let pairs = ModelName::ALL.iter().copied().enumerate().map(|(i, model)| (model, ESTIMATORS[i % ESTIMATORS.len()]));
+    for (model, (estimator, samples)) in pairs.chain(ESTIMATORS.map(|e| (ModelName::BETTER, e))) {
         set_model(scene, model);
         let Ok(method) = Subsurface::new(scene, options(estimator, samples)) else { continue };
         let name = format!("{}, {}", model.name(), estimator.name());
@@ -273,16 +273,9 @@ fn law_2_place_a_million_units_away_is_the_same_place() {
 /// what they claim of the normal. White and convex surfaces vanish, and so does a body that absorbs nothing for its paths.
 #[test]
 fn law_3_energy_furnaces_are_one() {
-    struct Total;
-    impl ModelVisitor for Total {
-        type Out = (Rgb, Claims);
-        fn visit<B: Bssrdf>(self, model: &B) -> (Rgb, Claims) {
-            (model.total(), model.claims())
-        }
-    }
     let (t21, mirror) = (f64::from(transmittance(1.3, 1.0)), f64::from(reflectance(1.3, 1.0)));
     for backend in backends() {
-        for model in ModelName::ALL.into_iter().filter(|model| *model != ModelName::Auto) {
+        for model in ModelName::models() {
             let mut s = Built::new(1.0, [0.0; 3]);
             s.camera([0.0, 0.0, 0.5], [0.0, 0.0, 0.0], 0.2);
             s.rectangle("plane", [0.0, 0.0, 0.0], [2.5, 0.0, 0.0], [0.0, 2.5, 0.0], "wax");
@@ -290,12 +283,13 @@ fn law_3_energy_furnaces_are_one() {
             s.text += "[environment]\nradiance = 1\n";
             let scene = s.load();
             let Surface::Translucent(t) = &scene.materials[0].surface else { panic!("not wax") };
-            let (mut total, claims) = t.build().unwrap().visit(Total);
+            let built = t.build().unwrap();
+            let (mut total, claims) = (built.total(), built.claims());
             assert!(!claims.bounded_energy || total.max() <= 1.0 && total.min() > 0.0, "{}: {total:?}", model.name());
             if !claims.first_order {
                 total += SingleScattering::new(&t.medium).total();
             }
-            let by_direction = matches!(model, ModelName::Beam | ModelName::Directional);
+            let by_direction = [ModelName::BEAM, ModelName::DIRECTIONAL].contains(&model);
             let runs: Vec<Image> = (1..=10)
                 .map(|seed| {
                     let method = Subsurface::new(&scene, SubsurfaceOptions { seed, ..options(Estimator::Cut, 4096) });

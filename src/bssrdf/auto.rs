@@ -1,12 +1,18 @@
 //! The model for a medium: what the validity chart of `optics` trusts most, or a slab where both faces count.
 
-use super::ModelName;
+use super::{ModelKind, ModelName};
 use crate::optics::{ChannelOptics, Medium, Trust};
+
+/// Whichever [`choose`] finds best.
+pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &["thickness"],
+    ..ModelKind::new("auto", |medium, options| choose(medium, options.thickness).name.build(medium, options))
+};
 
 /// A model and the reason for it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The model; never [`ModelName::Auto`].
+    /// The model; never [`ModelName::AUTO`].
     pub name: ModelName,
     /// One sentence for the log: what decided, and what remains doubtful.
     pub why: String,
@@ -32,7 +38,7 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
     let scattering = || medium.channels().into_iter().filter(|k| k.alpha_prime > 0.0);
     if scattering().next().is_none() {
         let why = "nothing scatters: every model is black".into();
-        return Choice { name: ModelName::Standard, why, trusted: true };
+        return Choice { name: ModelName::STANDARD, why, trusted: true };
     }
     let optics = ChannelOptics::of(medium);
     let trust = Trust::of(&optics);
@@ -43,11 +49,11 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
         let densest = in_paths(scattering().map(|k| k.sigma_t_prime).fold(0.0, f64::max));
         if relative > LEAST_THICKNESS && densest < MOST_THICKNESS {
             let why = format!("{relative:.1} transport mean free paths thick: both faces count");
-            return Choice { name: ModelName::Slab, why, trusted };
+            return Choice { name: ModelName::SLAB, why, trusted };
         }
         if relative <= LEAST_THICKNESS {
             let why = format!("{relative:.2} transport mean free paths thick, below 2: no model is near");
-            return Choice { name: ModelName::Beam, why, trusted: false };
+            return Choice { name: ModelName::BEAM, why, trusted: false };
         }
     }
     let least = optics.iter().map(|k| k.alpha_prime).fold(f64::INFINITY, f64::min);
@@ -58,7 +64,7 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
         Trust::PathTracing => "outside diffusion theory: no model is near",
     };
     // Photon beam diffusion with single scattering is first wherever the chart trusts any; where it trusts none, too.
-    Choice { name: ModelName::Beam, why: format!("{numbers}: {verdict}"), trusted }
+    Choice { name: ModelName::BEAM, why: format!("{numbers}: {verdict}"), trusted }
 }
 
 #[cfg(test)]
@@ -73,17 +79,17 @@ mod tests {
     #[test]
     fn the_chart_decides() {
         let milk = choose(&medium(2.55, 0.0011, 0.0), None);
-        assert!(milk.trusted && milk.name == ModelName::Beam, "{milk:?}");
+        assert!(milk.trusted && milk.name == ModelName::BEAM, "{milk:?}");
         let dark = choose(&medium(0.07, 0.97, 0.0), None);
         assert!(!dark.trusted && dark.why.contains("no model is near"), "{dark:?}");
         let forward = choose(&medium(20.0, 2.0, 0.95), None);
         assert!(!forward.trusted && forward.why.contains("g 0.950"), "{forward:?}");
         let slab = choose(&medium(2.55, 0.0011, 0.0), Some(4.0));
-        assert!(slab.trusted && slab.name == ModelName::Slab, "{slab:?}");
+        assert!(slab.trusted && slab.name == ModelName::SLAB, "{slab:?}");
         assert!(!choose(&medium(2.55, 0.0011, 0.0), Some(0.5)).trusted);
-        assert_eq!(choose(&medium(2.55, 0.0011, 0.0), Some(1e6)).name, ModelName::Beam);
+        assert_eq!(choose(&medium(2.55, 0.0011, 0.0), Some(1e6)).name, ModelName::BEAM);
         assert!(!choose(&medium(2.55, 0.0011, 0.0), Some(f32::NAN)).why.is_empty());
-        assert_ne!(choose(&medium(0.0, 1.0, 0.0), None).name, ModelName::Auto);
+        assert_ne!(choose(&medium(0.0, 1.0, 0.0), None).name, ModelName::AUTO);
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Photon beam diffusion: a source extended along the refracted ray.
 
-use super::beam_gather::SourceKernel;
+use super::beam_gather::{LAYOUT, SourceKernel, Sum};
 use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::depth::DepthLaw;
 use super::exponential::{exp, exp_m1};
-use super::{Bssrdf, Claims, Entry, Exit};
-use crate::math::{DVec3, GaussLegendre, Rgb};
+use super::gather::{EntryColumns, Layout, Row};
+use super::{Bssrdf, Claims, Entry, Exit, ModelKind, ModelName};
+use crate::math::{DVec3, GaussLegendre, Level, Rgb, dispatch_at};
 use crate::optics::Medium;
 use std::f64::consts::{LOG2_E, PI};
 use std::sync::LazyLock;
@@ -17,6 +18,14 @@ const RANGE: f64 = 25.0;
 
 /// Nearest distance of an exit to the ray, in mean free paths: the exitance grows as -ln r towards r = 0.
 const LEAST_DISTANCE: f64 = 1e-9;
+
+pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &["kappa-full"],
+    evidence: |options| (options.kappa == KappaExtinction::Reduced).then_some("beam"),
+    ..ModelKind::new("beam", |medium, options| {
+        Ok(Box::new(PhotonBeamDiffusion::new(medium, options.exit_normalisation, options.kappa)))
+    })
+};
 
 /// Extinction in the near-field correction κ = 1 - exp(-2 σ (d_r + t)). Published code differs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -125,7 +134,7 @@ impl Ray {
 }
 
 impl BeamChannel {
-    /// One channel. `exit_normalisation`: see [`super::Model::new`].
+    /// One channel. `exit_normalisation`: see [`super::ModelOptions`].
     pub fn new(medium: &ChannelMedium, exit_normalisation: bool, kappa: KappaExtinction) -> Self {
         let boundary = Boundary::new(medium.eta);
         let (sigma_t_prime, absorbed) = (medium.sigma_t_prime(), medium.absorbed());
@@ -296,7 +305,7 @@ impl BeamChannel {
 }
 
 impl PhotonBeamDiffusion {
-    /// The model of `medium`. `exit_normalisation`: see [`super::Model::new`].
+    /// The model of `medium`. `exit_normalisation`: see [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool, kappa: KappaExtinction) -> Self {
         let media: [ChannelMedium; 3] = std::array::from_fn(|c| ChannelMedium::of(medium, c));
         let grey = medium.is_grey();
@@ -311,7 +320,7 @@ impl PhotonBeamDiffusion {
     }
 
     /// The channels for vectorised sums, in f32.
-    pub(super) fn source_kernels(&self) -> [SourceKernel; 3] {
+    fn source_kernels(&self) -> [SourceKernel; 3] {
         self.channels.map(|k| SourceKernel {
             sigma: k.sigma_t_prime as f32,
             sigma_squared: to_finite(k.sigma_t_prime * k.sigma_t_prime),
@@ -323,11 +332,6 @@ impl PhotonBeamDiffusion {
             kappa_log2: (LOG2_E * k.kappa) as f32,
             scale: to_finite(k.exitance_scale * k.radiance),
         })
-    }
-
-    /// True where the three channels do not differ.
-    pub(super) fn is_grey(&self) -> bool {
-        self.grey
     }
 
     /// How depths are drawn, one for the three channels.
@@ -387,6 +391,43 @@ impl Bssrdf for PhotonBeamDiffusion {
 
     fn claims(&self) -> Claims {
         Claims { first_order: false, reciprocal: false, bounded_energy: false }
+    }
+
+    fn name(&self) -> ModelName {
+        ModelName::BEAM
+    }
+
+    /// The way along the refracted ray and from its end to the exit.
+    fn apart2(&self, entry: &Entry, depth: f32, exit: &Exit) -> f32 {
+        ((entry.x + entry.w * depth).distance(exit.x) + depth).powi(2)
+    }
+
+    /// Of S_d by depths, about.
+    fn variation(&self) -> f32 {
+        0.8
+    }
+
+    fn layout(&self) -> Layout {
+        LAYOUT
+    }
+
+    /// The source on the refracted ray at the sample's own depth, and its weight with the channels' share of that depth.
+    fn row(&self, entry: &Entry, depth: f32, flux: Rgb) -> Row {
+        let source = entry.x + entry.w * depth;
+        let own = self.depths.weights(f64::from(depth));
+        let weight: [f32; 3] = std::array::from_fn(|c| (own[c] * f64::from(flux[c])) as f32);
+        let below = (-entry.w.dot(entry.n) * depth).max(0.0);
+        let mut row = Row::default();
+        row[..3].copy_from_slice(&source.to_array());
+        row[3..6].copy_from_slice(&weight);
+        row[6..8].copy_from_slice(&[below, depth]);
+        row
+    }
+
+    /// In f32, each term within 1e-5.
+    fn gather_at(&self, level: Level, exits: &[Exit], sources: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
+        dispatch_at(level, Sum { channels: self.source_kernels(), grey: self.grey, exits, sources, sums });
+        0
     }
 
     /// Orders 2 and higher over a plane at normal incidence.

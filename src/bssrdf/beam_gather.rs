@@ -1,32 +1,14 @@
 //! Vectorised sums of photon beam diffusion over many cached entries, one depth each.
 
-use super::Partition;
+use super::Exit;
+#[cfg(doc)]
 use super::beam::PhotonBeamDiffusion;
-use super::radial::{BLOCK, LANES, add, in_mean_free_paths};
-use crate::math::{Kernel, Level, Vec3, dispatch_at, exp2_m1, times_exp2};
+use super::gather::{BLOCK, EntryColumns, LANES, Layout, add, block};
+use super::radial::in_mean_free_paths;
+use crate::math::{Kernel, Vec3, exp2_m1, times_exp2};
 
 /// Nearest distance of an exit to a source [mean free paths].
 const LEAST_DISTANCE: f32 = 1e-6;
-
-/// Cached entries in columns of one length: the source of each on its refracted ray, at the depth t that
-/// [`PhotonBeamDiffusion::sample_depth`] gave it.
-#[derive(Clone, Copy, Debug)]
-pub struct SourceColumns<'a> {
-    /// Coordinates of x_i + t w [unit].
-    pub x: &'a [f32],
-    /// Coordinates [unit].
-    pub y: &'a [f32],
-    /// Coordinates [unit].
-    pub z: &'a [f32],
-    /// Depth below the surface, -t w·n_i ≥ 0 [unit].
-    pub below: &'a [f32],
-    /// t [unit].
-    pub travelled: &'a [f32],
-    /// Flux or any other weight, per channel, times [`super::DepthLaw::weights`] of t.
-    pub weight: [&'a [f32]; 3],
-    /// The part of S_d that is summed, by [`Partition::share_source`].
-    pub partition: Partition,
-}
 
 /// One channel of the kernel in f32, lengths in transport mean free paths.
 #[derive(Clone, Copy, Debug)]
@@ -68,85 +50,70 @@ impl SourceKernel {
     }
 }
 
-struct Sum<'a> {
-    channels: [SourceKernel; 3],
-    grey: bool,
-    at: Vec3,
-    sources: SourceColumns<'a>,
+/// Columns beside point and weights: depth below the surface, -t w·n_i ≥ 0, and t [unit].
+pub(super) const LAYOUT: Layout = Layout { vectors: 0, numbers: 2 };
+
+/// Entries as sources: the point is x_i + t w, at the depth t that [`PhotonBeamDiffusion::sample_depth`] gave it, and the
+/// weight has the factor [`super::DepthLaw::weights`] of t. The part of S_d is by [`super::Partition::share_source`].
+pub(super) struct Sum<'a> {
+    pub channels: [SourceKernel; 3],
+    pub grey: bool,
+    pub exits: &'a [Exit],
+    pub sources: &'a EntryColumns<'a>,
+    pub sums: &'a mut [[f64; 3]],
 }
 
 impl Kernel for Sum<'_> {
-    type Out = [f64; 3];
+    type Out = ();
 
     #[inline(always)]
-    fn run(self) -> [f64; 3] {
-        let e = &self.sources;
-        let columns = [e.x, e.y, e.z, e.below, e.travelled, e.weight[0], e.weight[1], e.weight[2]];
-        let count = columns.iter().map(|c| c.len()).min().unwrap_or(0);
-        let mut lanes = [[0.0_f64; LANES]; 3];
-        let mut start = 0;
-        while start < count {
-            // Past the end, sources at the exit that weigh nothing.
-            let [x, y, z] = [(e.x, self.at.x), (e.y, self.at.y), (e.z, self.at.z)].map(|(c, at)| {
-                let mut apart = block(c, start, count, at);
-                apart.iter_mut().for_each(|v| *v -= at);
-                apart
-            });
-            let (below, travelled) = (block(e.below, start, count, 1.0), block(e.travelled, start, count, 1.0));
-            let (mut s, mut part) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
-            for i in 0..BLOCK {
-                part[i] = e.partition.share_source(x[i] * x[i] + y[i] * y[i] + z[i] * z[i], travelled[i]);
-            }
-            for (c, lanes) in lanes.iter_mut().enumerate() {
-                if c == 0 || !self.grey {
-                    let channel = self.channels[c];
-                    for i in 0..BLOCK {
-                        let r2 = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
-                        s[i] = channel.value(r2, below[i], travelled[i]);
-                    }
-                }
-                let mut weight = block(e.weight[c], start, count, 0.0);
-                for (weight, part) in weight.iter_mut().zip(&part) {
-                    *weight *= part;
-                }
-                add(lanes, &s, &weight);
-            }
-            start += BLOCK;
+    fn run(self) {
+        for (exit, sum) in self.exits.iter().zip(self.sums) {
+            *sum = sum_at(&self.channels, self.grey, exit.x, self.sources);
         }
-        lanes.map(|l| l.iter().sum())
     }
 }
 
 #[inline(always)]
-fn block(column: &[f32], start: usize, count: usize, fill: f32) -> [f32; BLOCK] {
-    let rest = &column[start..count];
-    if let Some(full) = rest.first_chunk::<BLOCK>() {
-        return *full;
+fn sum_at(channels: &[SourceKernel; 3], grey: bool, at: Vec3, e: &EntryColumns<'_>) -> [f64; 3] {
+    let count = e.count(2);
+    let mut lanes = [[0.0_f64; LANES]; 3];
+    let mut start = 0;
+    while start < count {
+        // Past the end, sources at the exit that weigh nothing.
+        let [x, y, z]: [[f32; BLOCK]; 3] = std::array::from_fn(|k| {
+            let mut apart = block(e.x[k], start, count, at[k]);
+            apart.iter_mut().for_each(|v| *v -= at[k]);
+            apart
+        });
+        let [below, travelled]: [[f32; BLOCK]; 2] = std::array::from_fn(|k| block(e.more[k], start, count, 1.0));
+        let (mut s, mut part) = ([0.0_f32; BLOCK], [0.0_f32; BLOCK]);
+        for i in 0..BLOCK {
+            part[i] = e.partition.share_source(x[i] * x[i] + y[i] * y[i] + z[i] * z[i], travelled[i]);
+        }
+        for (c, lanes) in lanes.iter_mut().enumerate() {
+            if c == 0 || !grey {
+                for i in 0..BLOCK {
+                    let r2 = x[i] * x[i] + y[i] * y[i] + z[i] * z[i];
+                    s[i] = channels[c].value(r2, below[i], travelled[i]);
+                }
+            }
+            let mut weight: [f32; BLOCK] = block(e.weight[c], start, count, 0.0);
+            for (weight, part) in weight.iter_mut().zip(&part) {
+                *weight *= part;
+            }
+            add(lanes, &s, &weight);
+        }
+        start += BLOCK;
     }
-    let mut padded = [fill; BLOCK];
-    padded[..rest.len()].copy_from_slice(rest);
-    padded
-}
-
-impl PhotonBeamDiffusion {
-    /// Σ weight_i · [`Self::eval_at_depth`]_i per channel over all sources, without the channels' weights of t, to an
-    /// exit at `at`. In f32, each term within 1e-5; summed in f64 in a fixed order, so that the bits do not depend on
-    /// `level`.
-    pub fn gather_at(&self, level: Level, at: Vec3, sources: SourceColumns<'_>) -> [f64; 3] {
-        dispatch_at(level, Sum { channels: self.source_kernels(), grey: self.is_grey(), at, sources })
-    }
-
-    /// [`Self::gather_at`] with the widest instruction set of this machine.
-    pub fn gather(&self, at: Vec3, sources: SourceColumns<'_>) -> [f64; 3] {
-        self.gather_at(Level::best(), at, sources)
-    }
+    lanes.map(|l| l.iter().sum())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Entry, Exit, KappaExtinction};
+    use super::super::{Bssrdf, Entry, KappaExtinction, Partition, PhotonBeamDiffusion};
     use super::*;
-    use crate::math::{Rgb, hash, unit_f32};
+    use crate::math::{Level, Rgb, hash, unit_f32};
     use crate::optics::Medium;
 
     struct Cache {
@@ -178,11 +145,18 @@ mod tests {
             cache
         }
 
-        fn columns(&self) -> SourceColumns<'_> {
+        fn columns(&self) -> EntryColumns<'_> {
             let [x, y, z, below, travelled] = &self.columns;
             let weight = [&*self.weight[0], &*self.weight[1], &*self.weight[2]];
-            SourceColumns { x, y, z, below, travelled, weight, partition: Partition::NONE }
+            let more: [&[f32]; 6] = [below, travelled, &[], &[], &[], &[]];
+            EntryColumns { x: [x, y, z], weight, more, partition: Partition::NONE }
         }
+    }
+
+    fn sum(model: &PhotonBeamDiffusion, level: Level, at: Vec3, columns: EntryColumns<'_>) -> [f64; 3] {
+        let mut sums = [[0.0; 3]];
+        model.gather_at(level, &[Exit { x: at, n: Vec3::Z, w: Vec3::Z }], &columns, &mut sums);
+        sums[0]
     }
 
     fn models() -> Vec<PhotonBeamDiffusion> {
@@ -199,7 +173,7 @@ mod tests {
             for count in [1, 63, 64, 1000] {
                 let cache = Cache::new(&model, count);
                 let at = Vec3::new(0.3, -0.2, 1.0);
-                let sum = model.gather(at, cache.columns());
+                let sum = sum(&model, Level::best(), at, cache.columns());
                 let mut expected = [0.0; 3];
                 for (entry, t) in &cache.entries {
                     let value = model.eval_at_depth(entry, *t, &Exit { x: at, n: Vec3::Z, w: Vec3::Z }, 0.0);
@@ -219,9 +193,9 @@ mod tests {
         for model in models() {
             let cache = Cache::new(&model, 1000);
             let at = Vec3::new(2.0, 1.0, 0.5);
-            let first = model.gather_at(Level::Baseline, at, cache.columns());
+            let first = sum(&model, Level::Baseline, at, cache.columns());
             for level in Level::available() {
-                assert_eq!(model.gather_at(level, at, cache.columns()), first, "{level:?}");
+                assert_eq!(sum(&model, level, at, cache.columns()), first, "{level:?}");
             }
         }
     }
@@ -231,16 +205,16 @@ mod tests {
         for model in models() {
             for (x, below, t) in [(0.0, 0.0, 0.0), (0.0, 1.0, 1.0), (1e20, 1.0, 1.0), (3e38, 1e30, 1e30)] {
                 let one = [1.0];
-                let sources = SourceColumns {
-                    x: &[x],
-                    y: &[0.0],
-                    z: &[0.0],
-                    below: &[below],
-                    travelled: &[t],
+                let sources = EntryColumns {
+                    x: [&[x], &[0.0], &[0.0]],
                     weight: [&one; 3],
+                    more: [&[below], &[t], &[], &[], &[], &[]],
                     partition: Partition::NONE,
                 };
-                assert!(model.gather(Vec3::ZERO, sources).iter().all(|v| v.is_finite()), "{x} {below} {t}");
+                assert!(
+                    sum(&model, Level::best(), Vec3::ZERO, sources).iter().all(|v| v.is_finite()),
+                    "{x} {below} {t}"
+                );
             }
         }
     }

@@ -1,11 +1,16 @@
 //! The better dipole.
 
-use super::Claims;
 use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, in_mean_free_paths, left};
 use super::standard::length_log2;
+use super::{Claims, ModelKind, ModelName};
 use crate::math::{Rgb, exp2_m1, times_exp2};
 use crate::optics::{FresnelMoments, Medium, better_total};
 use std::f64::consts::{LOG2_E, PI};
+
+pub(super) static MODEL: ModelKind = ModelKind {
+    evidence: |_| Some("better"),
+    ..ModelKind::new("better", |medium, options| Ok(Box::new(BetterDipole::new(medium, options.exit_normalisation))))
+};
 
 /// The better dipole [dEo12]: Grosjean's diffusion coefficient, the boundary with both Fresnel moments, and an exitance
 /// of fluence and flux. With lengths in l′ = 1/σ_t′, D = (2 - α′)/3, s = sqrt((1 - α′)/D), z_v = 1 + 4 A D and
@@ -47,7 +52,7 @@ pub struct Pair {
 }
 
 impl BetterDipole {
-    /// See [`super::Model::new`].
+    /// See [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool) -> Self {
         let moments = FresnelMoments::new(f64::from(medium.eta));
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
@@ -124,6 +129,7 @@ impl Formula for Pair {
 
 impl DistanceOnly for BetterDipole {
     type Channel = Pair;
+    const NAME: ModelName = ModelName::BETTER;
     const CLAIMS: Claims = Claims { first_order: false, reciprocal: true, bounded_energy: true };
 
     fn channels(&self) -> &Channels<Pair> {

@@ -1,11 +1,19 @@
 //! The directional dipole.
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
+use super::directional_gather::Sum;
 use super::exponential::{exp, exp_m1};
-use super::{Bssrdf, Claims, Entry, Exit};
-use crate::math::{DVec3, GaussLegendre, Rgb};
+use super::{Bssrdf, Claims, Entry, EntryColumns, Exit, ModelKind, ModelName};
+use crate::math::{DVec3, GaussLegendre, Level, Rgb, dispatch_at};
 use crate::optics::{HalfSpace, Medium};
 use std::f64::consts::PI;
+
+pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &["calibrated"],
+    own_exit_factor: true,
+    evidence: |options| Some(if options.calibrated { "calibrated" } else { "directional" }),
+    ..ModelKind::new("directional", |medium, options| Ok(Box::new(DirectionalDipole::new(medium, options.calibrated))))
+};
 
 /// The directional dipole [FHK14]: a ray source along the refracted direction and its mirror image in a plane
 /// through the two points, modified so that it contains the line between them.
@@ -30,7 +38,7 @@ use std::f64::consts::PI;
 ///   its total does not tend to 0 with α′ but to 0.14 at η = 1.3, while the truth does. Without any scattering it
 ///   is 0. A line can appear where n_o·w changes sign, because d_r jumps there.
 /// * Sign: the image outweighs the source at some exits. Rendering takes 0 there, as published;
-///   [`Self::eval_signed`] is the difference itself.
+///   [`Bssrdf::eval_signed`] is the difference itself.
 /// * Always has the exit factor 1/(4 C_phi(1/η)), as published.
 ///
 /// Computed in f64 from f32 inputs, in units of the transport mean free path, in a form without cancellation: real
@@ -266,17 +274,6 @@ impl DirectionalDipole {
         Self { channels, totals, extinction, grey, decay: decay as f32 }
     }
 
-    /// The channels, and whether they are the same.
-    pub(super) fn channels(&self) -> (&[DirectionalChannel; 3], bool) {
-        (&self.channels, self.grey)
-    }
-
-    /// S_d before the clamp at 0 [1/(unit² sr)]: negative where the image outweighs the source. What tables of the
-    /// formula hold; not for rendering.
-    pub fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
-        self.each_channel(entry, exit, 0.0, |value| value)
-    }
-
     fn each_channel(&self, entry: &Entry, exit: &Exit, rate: f32, finish: impl Fn(f64) -> f64) -> Rgb {
         let x = exit.x.as_dvec3() - entry.x.as_dvec3();
         let pair = Pair::new(x, entry.n.as_dvec3(), entry.w.as_dvec3(), exit.n.as_dvec3());
@@ -307,6 +304,23 @@ impl Bssrdf for DirectionalDipole {
 
     fn clamps(&self) -> bool {
         true
+    }
+
+    fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        self.each_channel(entry, exit, 0.0, |value| value)
+    }
+
+    fn name(&self) -> ModelName {
+        ModelName::DIRECTIONAL
+    }
+
+    /// Of S_d by directions, about.
+    fn variation(&self) -> f32 {
+        0.3
+    }
+
+    fn gather_at(&self, level: Level, exits: &[Exit], entries: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
+        dispatch_at(level, Sum { channels: &self.channels, grey: self.grey, exits, entries, sums })
     }
 
     fn claims(&self) -> Claims {

@@ -1,127 +1,90 @@
 //! Vectorised sums of the directional dipole over many cached entries.
 
-use super::directional::{DirectionalChannel, DirectionalDipole, Pair, clamped};
-use super::{EntryColumns, radial::LANES};
-use crate::math::{DVec3, Kernel, Level, Vec3, dispatch_at};
+use super::Exit;
+use super::directional::{DirectionalChannel, Pair, clamped};
+use super::gather::{EntryColumns, LANES, block};
+use crate::math::{DVec3, Kernel};
 
 /// Entries handled between two visits to memory.
 const BLOCK: usize = LANES;
 
-/// Normals and refracted directions of [`EntryColumns`], in columns of the same length.
-#[derive(Clone, Copy, Debug)]
-pub struct DirectionColumns<'a> {
-    /// x, y, z of the outward normals.
-    pub n: [&'a [f32]; 3],
-    /// x, y, z of the refracted directions, pointing into the medium.
-    pub w: [&'a [f32]; 3],
-}
-
-struct Sum<'a> {
-    channels: &'a [DirectionalChannel; 3],
-    grey: bool,
-    at: DVec3,
-    n_o: DVec3,
-    entries: EntryColumns<'a>,
-    directions: DirectionColumns<'a>,
+/// Σ weight_i · S_d(entry i, exit) per channel, by the code that gives [`super::Bssrdf::eval`], summed in a fixed order.
+pub(super) struct Sum<'a> {
+    pub channels: &'a [DirectionalChannel; 3],
+    pub grey: bool,
+    pub exits: &'a [Exit],
+    pub entries: &'a EntryColumns<'a>,
+    pub sums: &'a mut [[f64; 3]],
 }
 
 impl Kernel for Sum<'_> {
-    /// The sums, and how many values with a weight were clamped at 0.
-    type Out = ([f64; 3], u64);
+    /// How many values with a weight were below zero and taken as 0.
+    type Out = u64;
 
     #[inline(always)]
-    fn run(self) -> ([f64; 3], u64) {
-        let (e, d) = (&self.entries, &self.directions);
-        let columns = [e.x, e.y, e.z, d.n[0], d.n[1], d.n[2], d.w[0], d.w[1], d.w[2]];
-        let count = columns.iter().chain(&e.weight).map(|c| c.len()).min().unwrap_or(0);
-        let mut lanes = [[0.0_f64; BLOCK]; 3];
-        let mut below_zero = [0_u64; BLOCK];
-        let mut start = 0;
-        while start < count {
-            // Past the end, entries like none: of weight 0, at a distance from the exit.
-            let x = [(e.x, self.at.x), (e.y, self.at.y), (e.z, self.at.z)]
-                .map(|(column, at)| block(column, start, count, at as f32 + 1.0));
-            let n = d.n.map(|column| block(column, start, count, 1.0));
-            let w = d.w.map(|column| block(column, start, count, -1.0));
-            let mut weight = e.weight.map(|column| block(column, start, count, 0.0));
-            let mut pairs = [[0.0_f64; BLOCK]; 7];
-            for i in 0..BLOCK {
-                let vector = |v: &[[f32; BLOCK]; 3]| DVec3::new(v[0][i].into(), v[1][i].into(), v[2][i].into());
-                let apart = self.at - vector(&x);
-                let part = e.partition.share(apart.length_squared() as f32);
-                weight.iter_mut().for_each(|w| w[i] *= part);
-                let pair = Pair::new(apart, vector(&n), vector(&w), self.n_o).columns();
-                for (column, value) in pairs.iter_mut().zip(pair) {
-                    column[i] = value;
-                }
-            }
-            let mut s = [0.0_f64; BLOCK];
-            let mut negative = [0_u64; BLOCK];
-            for c in 0..3 {
-                if c == 0 || !self.grey {
-                    let channel = self.channels[c];
-                    for (i, (s, negative)) in s.iter_mut().zip(&mut negative).enumerate() {
-                        let value = channel.kernel(&Pair::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
-                        *s = clamped(value).min(f64::from(f32::MAX));
-                        *negative = u64::from(value < 0.0);
-                    }
-                }
-                for ((lane, s), &weight) in lanes[c].iter_mut().zip(&s).zip(&weight[c]) {
-                    *lane += s * f64::from(weight);
-                }
-                for ((sum, negative), &weight) in below_zero.iter_mut().zip(&negative).zip(&weight[c]) {
-                    *sum += if weight > 0.0 { *negative } else { 0 };
-                }
-            }
-            start += BLOCK;
+    fn run(self) -> u64 {
+        let mut below_zero = 0;
+        for (exit, sum) in self.exits.iter().zip(self.sums) {
+            let (at, clamped_ones) = sum_at(self.channels, self.grey, exit, self.entries);
+            *sum = at;
+            below_zero += clamped_ones;
         }
-        (lanes.map(|l| l.iter().sum()), below_zero.iter().sum())
+        below_zero
     }
 }
 
 #[inline(always)]
-fn block(column: &[f32], start: usize, count: usize, fill: f32) -> [f32; BLOCK] {
-    let rest = &column[start..count];
-    if let Some(full) = rest.first_chunk::<BLOCK>() {
-        return *full;
+fn sum_at(channels: &[DirectionalChannel; 3], grey: bool, exit: &Exit, e: &EntryColumns<'_>) -> ([f64; 3], u64) {
+    let (at, n_o) = (exit.x.as_dvec3(), exit.n.as_dvec3());
+    let count = e.count(6);
+    let mut lanes = [[0.0_f64; BLOCK]; 3];
+    let mut below_zero = [0_u64; BLOCK];
+    let mut start = 0;
+    while start < count {
+        // Past the end, entries like none: of weight 0, at a distance from the exit.
+        let x: [[f32; BLOCK]; 3] = std::array::from_fn(|k| block(e.x[k], start, count, at[k] as f32 + 1.0));
+        let n: [[f32; BLOCK]; 3] = std::array::from_fn(|k| block(e.more[k], start, count, 1.0));
+        let w: [[f32; BLOCK]; 3] = std::array::from_fn(|k| block(e.more[3 + k], start, count, -1.0));
+        let mut weight: [[f32; BLOCK]; 3] = e.weight.map(|column| block(column, start, count, 0.0));
+        let mut pairs = [[0.0_f64; BLOCK]; 7];
+        for i in 0..BLOCK {
+            let vector = |v: &[[f32; BLOCK]; 3]| DVec3::new(v[0][i].into(), v[1][i].into(), v[2][i].into());
+            let apart = at - vector(&x);
+            let part = e.partition.share(apart.length_squared() as f32);
+            weight.iter_mut().for_each(|w| w[i] *= part);
+            let pair = Pair::new(apart, vector(&n), vector(&w), n_o).columns();
+            for (column, value) in pairs.iter_mut().zip(pair) {
+                column[i] = value;
+            }
+        }
+        let mut s = [0.0_f64; BLOCK];
+        let mut negative = [0_u64; BLOCK];
+        for c in 0..3 {
+            if c == 0 || !grey {
+                let channel = channels[c];
+                for (i, (s, negative)) in s.iter_mut().zip(&mut negative).enumerate() {
+                    let value = channel.kernel(&Pair::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
+                    *s = clamped(value).min(f64::from(f32::MAX));
+                    *negative = u64::from(value < 0.0);
+                }
+            }
+            for ((lane, s), &weight) in lanes[c].iter_mut().zip(&s).zip(&weight[c]) {
+                *lane += s * f64::from(weight);
+            }
+            for ((sum, negative), &weight) in below_zero.iter_mut().zip(&negative).zip(&weight[c]) {
+                *sum += if weight > 0.0 { *negative } else { 0 };
+            }
+        }
+        start += BLOCK;
     }
-    let mut padded = [fill; BLOCK];
-    padded[..rest.len()].copy_from_slice(rest);
-    padded
-}
-
-impl DirectionalDipole {
-    /// Σ weight_i · S_d(entry i, exit) per channel, and how many of the values were below zero and taken as 0, to an exit at `at` with outward normal `n_o`, by the code that gives
-    /// [`super::Bssrdf::eval`], summed in a fixed order: the bits do not depend on `level`.
-    pub fn gather_at(
-        &self,
-        level: Level,
-        at: Vec3,
-        n_o: Vec3,
-        entries: EntryColumns<'_>,
-        directions: DirectionColumns<'_>,
-    ) -> ([f64; 3], u64) {
-        let (channels, grey) = self.channels();
-        dispatch_at(level, Sum { channels, grey, at: at.as_dvec3(), n_o: n_o.as_dvec3(), entries, directions })
-    }
-
-    /// [`Self::gather_at`] with the widest instruction set of this machine.
-    pub fn gather(
-        &self,
-        at: Vec3,
-        n_o: Vec3,
-        entries: EntryColumns<'_>,
-        directions: DirectionColumns<'_>,
-    ) -> ([f64; 3], u64) {
-        self.gather_at(Level::best(), at, n_o, entries, directions)
-    }
+    (lanes.map(|l| l.iter().sum()), below_zero.iter().sum())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bssrdf, Entry, Exit, Partition};
+    use super::super::{Bssrdf, DirectionalDipole, Entry, Partition};
     use super::*;
-    use crate::math::{Rgb, hash, unit_f32};
+    use crate::math::{Level, Rgb, Vec3, hash, unit_f32};
     use crate::optics::Medium;
 
     #[test]
@@ -153,15 +116,20 @@ mod tests {
                     }
                 }
                 let [x, y, z, n0, n1, n2, w0, w1, w2, r, g, b] = columns.each_ref().map(Vec::as_slice);
-                let entries = EntryColumns { x, y, z, weight: [r, g, b], partition: Partition::NONE };
-                let directions = DirectionColumns { n: [n0, n1, n2], w: [w0, w1, w2] };
-                let (sum, clamps) = model.gather_at(Level::Baseline, at, n_o, entries, directions);
+                let more = [n0, n1, n2, w0, w1, w2];
+                let entries = EntryColumns { x: [x, y, z], weight: [r, g, b], more, partition: Partition::NONE };
+                let of = |level| {
+                    let mut sums = [[0.0; 3]];
+                    let clamps = model.gather_at(level, &[Exit { x: at, n: n_o, w: n_o }], &entries, &mut sums);
+                    (sums[0], clamps)
+                };
+                let (sum, clamps) = of(Level::Baseline);
                 assert_eq!(clamps, clamped_ones);
                 for c in 0..3 {
                     assert!((sum[c] - expected[c]).abs() <= 1e-6 * expected[c], "{count}: {sum:?} {expected:?}");
                 }
                 for level in Level::available() {
-                    assert_eq!(model.gather_at(level, at, n_o, entries, directions), (sum, clamps), "{level:?}");
+                    assert_eq!(of(level), (sum, clamps), "{level:?}");
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! How wrong a model is expected to be at a place of a body: a table measured against paths through the medium, and the
 //! rule that reads it. `benches/validity.rs` makes the table; docs/models.md has it in words.
 
-use super::ModelName;
+use super::{ModelName, ModelOptions};
 use crate::optics::ChannelOptics;
 use serde::Serialize;
 use std::sync::OnceLock;
@@ -69,17 +69,6 @@ impl Place {
     }
 }
 
-/// The models of the table, in the order of its columns: a name, and whether it is scaled to the true albedo.
-const MODELS: [(ModelName, bool); 7] = [
-    (ModelName::Standard, false),
-    (ModelName::Better, false),
-    (ModelName::Beam, false),
-    (ModelName::Directional, false),
-    (ModelName::Directional, true),
-    (ModelName::Normalised, false),
-    (ModelName::Slab, false),
-];
-
 /// Sizes of slabs and balls in the table [transport mean free paths]; a half space is the end of both rows.
 const SIZES: [f64; 6] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
 /// Refractive indices of the rows with g = 0.
@@ -105,7 +94,7 @@ pub enum Unmeasured {
     Open,
 }
 
-/// The error of `model` at `place`, where it has been measured; `calibrated` is about `directional` alone.
+/// The error of `model` at `place`, where it has been measured.
 ///
 /// The table has slabs of thickness H, balls of radius R and the half space. A place of thickness H and mean curvature
 /// 1/R is read as
@@ -121,11 +110,11 @@ pub enum Unmeasured {
 /// Where nothing has been measured.
 pub fn expected_error(
     model: ModelName,
-    calibrated: bool,
+    options: &ModelOptions,
     place: &Place,
 ) -> std::result::Result<ExpectedError, Unmeasured> {
-    let calibrated = calibrated && model == ModelName::Directional;
-    let column = MODELS.iter().position(|m| *m == (model, calibrated)).ok_or(Unmeasured::Model)?;
+    let head = model.evidence(options).ok_or(Unmeasured::Model)?;
+    let column = table().models.iter().position(|m| *m == head).ok_or(Unmeasured::Model)?;
     if !(ETAS[0] - SLACK..=ETAS[2] + SLACK).contains(&place.eta) {
         return Err(Unmeasured::Index);
     }
@@ -190,6 +179,8 @@ struct Shapes {
 
 /// One for each of [`ETAS`], and [`FORWARD`].
 struct Table {
+    /// Heads of the models' columns, in their order.
+    models: Vec<&'static str>,
     media: Vec<Shapes>,
 }
 
@@ -257,7 +248,10 @@ fn table() -> &'static Table {
 const KEYS: usize = 6;
 
 /// The file is our own: a cell that is no number is a model that does not exist there.
-fn read(text: &str) -> Table {
+fn read(text: &'static str) -> Table {
+    let heads = text.lines().next().unwrap_or("").split(',').skip(KEYS);
+    let models: Vec<&str> = heads.filter_map(|head| head.strip_suffix("_total")).collect();
+    let count = models.len();
     let media = ETAS.map(|eta| (eta, 0.0)).into_iter().chain([FORWARD]);
     let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
     let number = |row: &[&str], i: usize| row.get(i).and_then(|c| c.parse::<f64>().ok());
@@ -274,22 +268,26 @@ fn read(text: &str) -> Table {
         let mut albedos: Vec<f64> = mine().filter_map(|row| number(row, 4)).collect();
         albedos.sort_by(f64::total_cmp);
         albedos.dedup();
-        let mut errors = vec![vec![vec![None; albedos.len()]; 1 + 2 * SIZES.len()]; MODELS.len()];
+        let mut errors = vec![vec![vec![None; albedos.len()]; 1 + 2 * SIZES.len()]; count];
         for row in mine() {
             let Some(albedo) = albedos.iter().position(|&a| number(row, 4) == Some(a)) else { continue };
             for (column, errors) in errors.iter_mut().enumerate() {
                 let cell = |k: usize| number(row, KEYS + 2 * column + k);
-                let far = number(row, KEYS + 2 * MODELS.len() + column);
+                let far = number(row, KEYS + 2 * count + column);
                 if let (Some(total), Some(distribution)) = (cell(0), cell(1)) {
                     errors[shape(row)][albedo] = Some(ExpectedError { total, distribution, far });
                 }
             }
         }
         // A slab so thick that it is a half space is the standard dipole.
-        errors[6][0] = errors[0][0].clone();
+        let at = |head: &str| models.iter().position(|m| *m == head);
+        if let (Some(slab), Some(standard)) = (at("slab"), at("standard")) {
+            errors[slab][0] = errors[standard][0].clone();
+        }
         Shapes { albedos, errors }
     };
-    Table { media: media.map(of).collect() }
+    let media = media.map(of).collect();
+    Table { models, media }
 }
 
 #[cfg(test)]
@@ -298,6 +296,13 @@ mod tests {
 
     fn place(alpha_prime: f64, thickness: f64, curvature: f64) -> Place {
         Place { alpha_prime, g: 0.0, eta: 1.3, thickness, curvature }
+    }
+
+    /// By the head of the columns.
+    fn error_of(head: &str, place: &Place) -> std::result::Result<ExpectedError, Unmeasured> {
+        let options = ModelOptions { calibrated: head == "calibrated", ..ModelOptions::DEFAULT };
+        let is = |model: &&ModelName| model.evidence(&options) == Some(head);
+        expected_error(*ModelName::ALL.iter().find(is).unwrap(), &options, place)
     }
 
     /// Cells of the file, by the words that begin its row.
@@ -318,17 +323,17 @@ mod tests {
             ("1.3,0.8,ball,10,0.9,", Place { g: 0.8, ..place(0.9, 20.0, 0.1) }),
         ] {
             let cells = row(head);
-            for (k, (model, calibrated)) in MODELS.into_iter().enumerate() {
+            for (k, column) in table().models.iter().enumerate() {
                 if cells[2 * k].is_nan() {
                     continue;
                 }
-                let error = expected_error(model, calibrated, &place).unwrap();
+                let error = error_of(column, &place).unwrap();
                 let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
                 assert!(
                     close(error.total, cells[2 * k]) && close(error.distribution, cells[2 * k + 1]),
                     "{head} {error:?}"
                 );
-                let far = cells[2 * MODELS.len() + k];
+                let far = cells[2 * table().models.len() + k];
                 assert!(error.far.map_or(far.is_nan(), |e| close(e, far)), "{head} {error:?} {far}");
             }
         }
@@ -343,7 +348,7 @@ mod tests {
                 for (shape, errors) in shapes.iter().enumerate() {
                     for e in errors {
                         // The slab of one transport mean free path is the only thing that does not exist.
-                        assert!(e.is_some() != (k == 6 && shape == 1), "{k} {shape}");
+                        assert!(e.is_some() != (table.models[k] == "slab" && shape == 1), "{k} {shape}");
                         assert!(e.is_none_or(|e| e.distribution + 2e-3 >= e.total.abs()), "{k} {shape} {e:?}");
                     }
                 }
@@ -355,24 +360,24 @@ mod tests {
     #[test]
     fn a_bent_sheet_lies_between_the_sheet_and_the_ball() {
         let (sheet, ball) = (row("1.3,0,slab,10,0.9,"), row("1.3,0,ball,5,0.9,"));
-        let error = expected_error(ModelName::Standard, false, &place(0.9, 10.0, 0.05)).unwrap();
-        let column = 2 * MODELS.iter().position(|m| *m == (ModelName::Standard, false)).unwrap();
+        let error = error_of("standard", &place(0.9, 10.0, 0.05)).unwrap();
+        let column = 2 * table().models.iter().position(|m| *m == "standard").unwrap();
         let expected = 0.75 * sheet[column] + 0.25 * ball[column];
         assert!((error.total - expected).abs() < 1e-9, "{error:?} {expected}");
     }
 
     #[test]
     fn between_rows_the_error_has_no_steps() {
-        for model in [ModelName::Standard, ModelName::Beam] {
+        for model in ["standard", "beam"] {
             let mut last = None;
             for i in 0..4000 {
                 let thickness = 10f64.powf(f64::from(i) / 1000.0);
-                let error = expected_error(model, false, &place(0.95, thickness, 0.05)).unwrap().distribution;
+                let error = error_of(model, &place(0.95, thickness, 0.05)).unwrap().distribution;
                 assert!(last.is_none_or(|l: f64| (l - error).abs() < 0.02), "{thickness}: {last:?} {error}");
                 last = Some(error);
             }
             for far in [1e6, f64::INFINITY] {
-                let error = |far, bent| expected_error(model, false, &place(0.95, far, bent)).unwrap().distribution;
+                let error = |far, bent| error_of(model, &place(0.95, far, bent)).unwrap().distribution;
                 assert!((error(far, 1e-9) - error(f64::INFINITY, 0.0)).abs() < 1e-4);
             }
         }
@@ -382,8 +387,8 @@ mod tests {
     #[test]
     fn what_has_not_been_measured_has_no_figure() {
         let sound = place(0.9, 10.0, 0.0);
-        let of = |model, place: Place| expected_error(model, false, &place).err();
-        let beam = |place| of(ModelName::Beam, place);
+        let of = |model, place: Place| expected_error(model, &ModelOptions::DEFAULT, &place).err();
+        let beam = |place| of(ModelName::BEAM, place);
         assert_eq!(beam(sound), None);
         for alpha_prime in [0.0, 0.29, 0.99992, 1.0, f64::NAN] {
             assert_eq!(beam(Place { alpha_prime, ..sound }), Some(Unmeasured::Albedo), "{alpha_prime}");
@@ -401,9 +406,9 @@ mod tests {
         );
         assert_eq!(beam(Place { thickness: f64::NAN, ..sound }), Some(Unmeasured::Open));
         assert_eq!(beam(Place { thickness: 0.99, ..sound }), Some(Unmeasured::Thin));
-        assert_eq!(of(ModelName::Auto, sound), Some(Unmeasured::Model));
-        assert_eq!(of(ModelName::Slab, Place { thickness: 1.5, ..sound }), Some(Unmeasured::Model));
-        assert_eq!(of(ModelName::Slab, sound), None);
+        assert_eq!(of(ModelName::AUTO, sound), Some(Unmeasured::Model));
+        assert_eq!(of(ModelName::SLAB, Place { thickness: 1.5, ..sound }), Some(Unmeasured::Model));
+        assert_eq!(of(ModelName::SLAB, sound), None);
         // The nearest end has.
         for place in [
             Place { g: 0.4, alpha_prime: 0.1, ..sound },

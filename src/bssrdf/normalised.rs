@@ -1,7 +1,7 @@
 //! Normalised diffusion.
 
-use super::Claims;
 use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, left};
+use super::{Claims, ModelKind, ModelName};
 use crate::error::{Error, Result};
 use crate::math::{Rgb, exp2};
 use crate::optics::{FresnelMoments, Medium, standard_total};
@@ -52,6 +52,14 @@ impl std::str::FromStr for WidthFit {
     }
 }
 
+pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &["width"],
+    evidence: |_| Some("normalised"),
+    ..ModelKind::new("normalised", |medium, options| {
+        Ok(Box::new(NormalisedDiffusion::new(medium, options.exit_normalisation)))
+    })
+};
+
 /// Normalised diffusion [CB15]: two exponentials fitted to Monte Carlo profiles, with the integral A built in.
 ///
 ///   R_d(r) = A (exp(-r/d) + exp(-r/3d)) / (8π d r),   CDF(r) = 1 - exp(-r/d)/4 - 3 exp(-r/3d)/4
@@ -85,7 +93,7 @@ pub struct Width {
 
 impl NormalisedDiffusion {
     /// From a medium: A is the standard dipole's total, l the diffusion length (at most 40 transport mean free
-    /// paths): the variant nearest to transport behind a boundary. See [`super::Model::new`].
+    /// paths): the variant nearest to transport behind a boundary. See [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool) -> Self {
         let moments = FresnelMoments::new(f64::from(medium.eta));
         let fit = WidthFit::DiffusionLength;
@@ -226,6 +234,7 @@ impl Width {
 
 impl DistanceOnly for NormalisedDiffusion {
     type Channel = Width;
+    const NAME: ModelName = ModelName::NORMALISED;
     const CLAIMS: Claims = Claims { first_order: true, reciprocal: true, bounded_energy: true };
 
     fn channels(&self) -> &Channels<Width> {

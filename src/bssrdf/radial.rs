@@ -1,7 +1,8 @@
 //! What models share that know the distance between entry and exit alone: one formula per channel, from which come
 //! the value for a pair of points, vectorised batches, and sums over a cache of entry points.
 
-use super::{Bssrdf, Claims, Entry, Exit, Partition};
+use super::gather::{BLOCK, EntryColumns, LANES, Layout, add, block};
+use super::{Bssrdf, Claims, Entry, Exit, ModelName};
 use crate::math::{Kernel, Level, Rgb, Vec3, dispatch_at};
 
 /// A model that can say M(r): exitance at distance r per flux that entered.
@@ -20,33 +21,6 @@ pub trait Radial: Bssrdf {
     /// [`Self::exitance_batch_at`] with the widest instruction set of this machine.
     fn exitance_batch(&self, channel: usize, r: &[f32], out: &mut [f32]) {
         self.exitance_batch_at(Level::best(), channel, r, out);
-    }
-}
-
-/// Points of entry in columns of one length, with what entered at each.
-#[derive(Clone, Copy, Debug)]
-pub struct EntryColumns<'a> {
-    /// Coordinates [unit].
-    pub x: &'a [f32],
-    /// Coordinates [unit].
-    pub y: &'a [f32],
-    /// Coordinates [unit].
-    pub z: &'a [f32],
-    /// Flux or any other weight, per channel.
-    pub weight: [&'a [f32]; 3],
-    /// The part of S_d that is summed.
-    pub partition: Partition,
-}
-
-/// A model whose S_d is a function of the distance alone, so that sums over many entries vectorise.
-pub trait Gather: Radial {
-    /// Σ S_d(|x_o - x_i|) weight_i per channel over all entries, to an exit at `x`. Products are rounded to f32 and
-    /// summed in f64 in a fixed order of 16 lanes: the bits do not depend on `level`.
-    fn gather_at(&self, level: Level, x: Vec3, entries: EntryColumns<'_>) -> [f64; 3];
-
-    /// [`Self::gather_at`] with the widest instruction set of this machine.
-    fn gather(&self, x: Vec3, entries: EntryColumns<'_>) -> [f64; 3] {
-        self.gather_at(Level::best(), x, entries)
     }
 }
 
@@ -135,6 +109,8 @@ pub struct Channels<C: Channel> {
 pub trait DistanceOnly: Send + Sync {
     /// Its formula.
     type Channel: Channel;
+    /// What it is called.
+    const NAME: ModelName;
     /// What it promises.
     const CLAIMS: Claims;
     /// Its constants.
@@ -173,6 +149,24 @@ impl<M: DistanceOnly> Bssrdf for M {
     fn claims(&self) -> Claims {
         M::CLAIMS
     }
+
+    fn name(&self) -> ModelName {
+        M::NAME
+    }
+
+    fn radial(&self) -> Option<&dyn Radial> {
+        Some(self)
+    }
+
+    fn layout(&self) -> Layout {
+        Layout::POINTS
+    }
+
+    fn gather_at(&self, level: Level, exits: &[Exit], entries: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
+        let k = self.channels();
+        dispatch_at(level, Sum { channels: &k.each, grey: k.grey, exits, entries, sums });
+        0
+    }
 }
 
 impl<C: Channel> Channels<C> {
@@ -204,13 +198,6 @@ impl<M: DistanceOnly> Radial for M {
     }
 }
 
-impl<M: DistanceOnly> Gather for M {
-    fn gather_at(&self, level: Level, x: Vec3, entries: EntryColumns<'_>) -> [f64; 3] {
-        let k = self.channels();
-        dispatch_at(level, Sum { channels: &k.each, grey: k.grey, x, entries })
-    }
-}
-
 /// M(r) of one channel over a slice.
 pub(super) struct Batch<'a, C> {
     pub channel: C,
@@ -239,103 +226,56 @@ impl<C: Formula> Kernel for Batch<'_, C> {
     }
 }
 
-/// Entries handled between two visits to memory; a multiple of the lanes of the sum.
-pub(super) const BLOCK: usize = 64;
-/// Lanes of the sum, whatever the instruction set.
-pub(super) const LANES: usize = 16;
-
 struct Sum<'a, C> {
     channels: &'a [C; 3],
     grey: bool,
-    x: Vec3,
-    entries: EntryColumns<'a>,
+    exits: &'a [Exit],
+    entries: &'a EntryColumns<'a>,
+    sums: &'a mut [[f64; 3]],
 }
 
 impl<C: Formula> Kernel for Sum<'_, C> {
-    type Out = [f64; 3];
+    type Out = ();
 
     #[inline(always)]
-    fn run(self) -> [f64; 3] {
-        let e = &self.entries;
-        let count = [e.x, e.y, e.z, e.weight[0], e.weight[1], e.weight[2]].iter().map(|c| c.len()).min().unwrap_or(0);
-        let mut lanes = [[0.0_f64; LANES]; 3];
-        let mut start = 0;
-        while start < count {
-            let mut block = Block::load(e, start, count, self.x);
-            let r2 = block.distances(self.x);
-            block.keep_part(e.partition, &r2);
-            let mut s = [0.0_f32; BLOCK];
-            for (c, lanes) in lanes.iter_mut().enumerate() {
-                if c == 0 || !self.grey {
-                    s = self.channels[c].values(&r2);
-                }
-                add(lanes, &s, &block.weight[c]);
-            }
-            start += BLOCK;
+    fn run(self) {
+        for (exit, sum) in self.exits.iter().zip(self.sums) {
+            *sum = sum_at(self.channels, self.grey, exit.x, self.entries);
         }
-        lanes.map(|l| l.iter().sum())
     }
 }
 
 #[inline(always)]
-pub(super) fn add(lanes: &mut [f64; LANES], s: &[f32; BLOCK], weight: &[f32; BLOCK]) {
-    for (s, w) in s.chunks_exact(LANES).zip(weight.chunks_exact(LANES)) {
-        for ((lane, s), w) in lanes.iter_mut().zip(s).zip(w) {
-            *lane += f64::from(s * w);
+fn sum_at<C: Formula>(channels: &[C; 3], grey: bool, at: Vec3, e: &EntryColumns<'_>) -> [f64; 3] {
+    let count = e.count(0);
+    let mut lanes = [[0.0_f64; LANES]; 3];
+    let mut start = 0;
+    while start < count {
+        // Past the end, points at the exit that weigh nothing.
+        let x: [[f32; BLOCK]; 3] = std::array::from_fn(|k| block(e.x[k], start, count, at[k]));
+        let mut r2 = [0.0; BLOCK];
+        for (i, r2) in r2.iter_mut().enumerate() {
+            let (x, y, z) = (x[0][i] - at.x, x[1][i] - at.y, x[2][i] - at.z);
+            *r2 = x * x + y * y + z * z;
         }
-    }
-}
-
-/// A block of entries; past the end, points at the exit that weigh nothing.
-struct Block {
-    x: [f32; BLOCK],
-    y: [f32; BLOCK],
-    z: [f32; BLOCK],
-    weight: [[f32; BLOCK]; 3],
-}
-
-impl Block {
-    #[inline(always)]
-    fn load(e: &EntryColumns<'_>, start: usize, count: usize, at: Vec3) -> Self {
-        let column = |source: &[f32], fill: f32| -> [f32; BLOCK] {
-            let rest = &source[start..count];
-            if let Some(full) = rest.first_chunk::<BLOCK>() {
-                return *full;
-            }
-            let mut padded = [fill; BLOCK];
-            padded[..rest.len()].copy_from_slice(rest);
-            padded
-        };
-        Self {
-            x: column(e.x, at.x),
-            y: column(e.y, at.y),
-            z: column(e.z, at.z),
-            weight: e.weight.map(|w| column(w, 0.0)),
-        }
-    }
-
-    #[inline(always)]
-    fn keep_part(&mut self, partition: Partition, r2: &[f32; BLOCK]) {
         let mut share = [0.0; BLOCK];
-        for (share, &r2) in share.iter_mut().zip(r2) {
-            *share = partition.share(r2);
+        for (share, &r2) in share.iter_mut().zip(&r2) {
+            *share = e.partition.share(r2);
         }
-        for weight in &mut self.weight {
+        let mut s = [0.0_f32; BLOCK];
+        for (c, lanes) in lanes.iter_mut().enumerate() {
+            if c == 0 || !grey {
+                s = channels[c].values(&r2);
+            }
+            let mut weight: [f32; BLOCK] = block(e.weight[c], start, count, 0.0);
             for (weight, share) in weight.iter_mut().zip(&share) {
                 *weight *= share;
             }
+            add(lanes, &s, &weight);
         }
+        start += BLOCK;
     }
-
-    #[inline(always)]
-    fn distances(&self, at: Vec3) -> [f32; BLOCK] {
-        let mut r2 = [0.0; BLOCK];
-        for (i, r2) in r2.iter_mut().enumerate() {
-            let (x, y, z) = (self.x[i] - at.x, self.y[i] - at.y, self.z[i] - at.z);
-            *r2 = x * x + y * y + z * z;
-        }
-        r2
-    }
+    lanes.map(|l| l.iter().sum())
 }
 
 /// The largest squared distance in transport mean free paths that is told from infinity.

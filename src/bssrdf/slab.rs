@@ -1,13 +1,24 @@
 //! The multipole: a slab between two boundaries.
 
+use super::gather::BLOCK;
 use super::multipole::Multipole;
-use super::radial::{BLOCK, Batch, Formula, Radial, finite, in_mean_free_paths, left};
+use super::radial::{Batch, Formula, Radial, finite, in_mean_free_paths, left};
 use super::standard::length_log2;
-use super::{Bssrdf, Claims, Entry, Exit};
+use super::{Bssrdf, Claims, Entry, Exit, ModelKind, ModelName};
 use crate::error::{Error, Result};
 use crate::math::{Level, Rgb, dispatch_at, times_exp2};
 use crate::optics::{FresnelMoments, Medium};
 use std::f64::consts::{LOG2_E, PI};
+
+pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &["thickness", "eta_far", "transmitted"],
+    evidence: |_| Some("slab"),
+    ..ModelKind::new("slab", |medium, options| {
+        let thickness = options.thickness.ok_or_else(|| Error::scene("the model `slab` needs a `thickness`"))?;
+        let eta_far = options.eta_far.unwrap_or(medium.eta);
+        Ok(Box::new(Slab::between(medium, thickness, eta_far, options.exit_normalisation)?))
+    })
+};
 
 /// The multipole of a flat slab [DJ05]: the point source at depth l′ and its images in both extrapolated boundaries,
 /// without end. With lengths in l′ = 1/σ_t′, s = sqrt(3 (1 - α′)), z_b = 2/3 A at each face, period
@@ -66,7 +77,7 @@ pub struct Face {
 }
 
 impl Slab {
-    /// A slab of `thickness` [unit] with the same medium outside both faces. See [`super::Model::new`].
+    /// A slab of `thickness` [unit] with the same medium outside both faces. See [`super::ModelOptions`].
     ///
     /// # Errors
     /// As [`Self::between`].
@@ -131,12 +142,6 @@ impl Slab {
     pub fn transmitted_batch(&self, channel: usize, r: &[f32], out: &mut [f32]) {
         let batch = Batch { channel: &self.transmitted[channel], exitance: self.exitance[1], r, out };
         dispatch_at(Level::best(), batch);
-    }
-
-    /// S_d before the clamp at 0 [1/(unit² sr)]: far out between unlike boundaries the sum of the images is negative.
-    /// What tables of the formula hold; not for rendering.
-    pub fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
-        self.signed(entry, exit, 0.0)
     }
 
     fn signed(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
@@ -309,6 +314,18 @@ impl Bssrdf for Slab {
 
     fn clamps(&self) -> bool {
         true
+    }
+
+    fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        self.signed(entry, exit, 0.0)
+    }
+
+    fn name(&self) -> ModelName {
+        ModelName::SLAB
+    }
+
+    fn radial(&self) -> Option<&dyn Radial> {
+        Some(self)
     }
 
     fn claims(&self) -> Claims {

@@ -1,10 +1,17 @@
 //! The standard dipole.
 
-use super::Claims;
 use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, in_mean_free_paths, left};
+use super::{Claims, ModelKind, ModelName};
 use crate::math::{Rgb, exp2, times_exp2};
 use crate::optics::{FresnelMoments, Medium, Reduced, standard_total};
 use std::f64::consts::{LOG2_E, PI};
+
+pub(super) static MODEL: ModelKind = ModelKind {
+    evidence: |_| Some("standard"),
+    ..ModelKind::new("standard", |medium, options| {
+        Ok(Box::new(StandardDipole::new(medium, options.exit_normalisation)))
+    })
+};
 
 /// The standard dipole [JMLH01]: a point source one transport mean free path l′ below the entry and its image above
 /// the surface, so that fluence vanishes on the extrapolated boundary. With lengths in l′ = 1/σ_t′ and
@@ -38,7 +45,7 @@ pub struct Pole {
 }
 
 impl StandardDipole {
-    /// See [`super::Model::new`].
+    /// See [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool) -> Self {
         let moments = FresnelMoments::new(f64::from(medium.eta));
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
@@ -111,6 +118,7 @@ impl Formula for Pole {
 
 impl DistanceOnly for StandardDipole {
     type Channel = Pole;
+    const NAME: ModelName = ModelName::STANDARD;
     const CLAIMS: Claims = Claims { first_order: true, reciprocal: true, bounded_energy: true };
 
     fn channels(&self) -> &Channels<Pole> {

@@ -1,7 +1,7 @@
 //! The sum over a tree of samples, in which one random member stands for each far node.
 
-use super::{Columns, Envelope, Node, Tree};
-use crate::bssrdf::{Exit, Model, Partition};
+use super::{Columns, Envelope, GatherTally, Node, Tree, Tuning};
+use crate::bssrdf::{Bssrdf, Exit, Layout};
 use crate::math::{Vec3, Vec4, hash};
 
 /// A node whose members spread over less than this share of its distance counts as a point when the sum is guessed.
@@ -16,59 +16,32 @@ const DARK_CHANNEL: f32 = 0.02;
 /// Exits at which the sum of a group is guessed, at most.
 const GUESSES: usize = 4;
 
-/// Working space of [`cut`], for one model.
-pub struct Buffer {
+/// Working space of one task.
+pub struct Scratch {
+    /// Samples of one group.
     columns: Columns,
     clusters: Columns,
     /// Samples to evaluate, and factors on their weights.
     picked: Vec<(u32, f32)>,
     /// Nodes for which one member stands.
     far: Vec<u32>,
-    /// Exits in the order of their groups.
-    order: Vec<u32>,
+    /// Exits of one group, and their sums.
+    exits: Vec<Exit>,
+    sums: Vec<[f64; 3]>,
 }
 
-impl Buffer {
-    /// Empty.
-    pub fn new(model: &Model) -> Self {
-        Self {
-            columns: Columns::new(model),
-            clusters: Columns::new(model),
-            picked: Vec::new(),
-            far: Vec::new(),
-            order: Vec::new(),
-        }
+impl Default for Scratch {
+    fn default() -> Self {
+        let [columns, clusters] = [0; 2].map(|_| Columns::new(Layout::POINTS));
+        Self { columns, clusters, picked: Vec::new(), far: Vec::new(), exits: Vec::new(), sums: Vec::new() }
     }
 }
 
-/// What the sums over a tree cost.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct CutWork {
-    /// Nodes visited.
-    pub nodes: u64,
-    /// Pairs at which S_d was evaluated.
-    pub evaluated: u64,
-    /// Values of S_d below zero that counted as 0.
-    pub clamped: u64,
-}
-
-/// A cut's tree, model and how coarse it may be.
-#[derive(Clone, Copy)]
-pub struct Cut<'a> {
-    /// The samples.
-    pub tree: &'a Tree,
+/// A tree over the samples, and what stands for its nodes where no random member does.
+pub struct Cut {
+    tree: Tree,
     /// Where given, the mean of its members stands for a far node in place of a random one [JB02]: biased.
-    pub clusters: Option<&'a Columns>,
-    /// Their S_d.
-    pub model: &'a Model,
-    /// How fast it falls.
-    pub envelope: &'a Envelope,
-    /// The largest share of the whole sum that the standard deviation of one node may have.
-    pub error: f32,
-    /// Sums below this are held to the accuracy of one of this size; the fourth is 0.
-    pub floor: Vec4,
-    /// The part of S_d that is summed.
-    pub partition: Partition,
+    clusters: Option<Columns>,
 }
 
 /// Exits that share one cut: a ball around them.
@@ -77,44 +50,71 @@ struct Ball {
     radius: f32,
 }
 
-impl Cut<'_> {
+impl Cut {
+    /// Over `samples`; `clusters` stand for far nodes if so.
+    pub fn new(samples: &Columns, clusters: bool) -> Self {
+        let tree = Tree::new(samples);
+        let clusters = clusters.then(|| tree.clusters());
+        Self { tree, clusters }
+    }
+
+    /// Nodes of the tree.
+    pub fn nodes(&self) -> usize {
+        self.tree.nodes.len()
+    }
+
+    /// Bytes of the tree.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes()
+    }
+
     /// Σ S_d · weight per channel over all samples of the tree, to each of `exits`, unbiased: leaves near an exit are
     /// summed, one member drawn with probability proportional to its weight stands for every other node of the cut.
     /// Neighbouring exits share a cut and its draws, which makes the walk through the tree cheap and the noise of
-    /// the draws alike in a group. `keys`, one for each exit, seed the draws; `buffer` is working space.
+    /// the draws alike in a group. `keys`, one for each exit, seed the draws.
     ///
     /// A node's standard deviation is taken as |dS_d/dr| × spread × weight at its near side, and what its members'
     /// colours add. The sum itself is guessed from centres. Both decide only which nodes are opened and do not depend
     /// on the draws, so that the mean is exact.
-    pub fn sums(&self, exits: &[Exit], keys: &[u64], buffer: &mut Buffer, out: &mut [[f64; 3]]) -> CutWork {
-        let mut order = std::mem::take(&mut buffer.order);
-        order.clear();
-        order.extend(0..exits.len() as u32);
-        let mut work = CutWork::default();
-        self.split(exits, keys, &mut order, buffer, out, &mut work);
-        buffer.order = order;
-        work
-    }
-
-    /// Halves `order` at medians until the exits are few and near enough to share a cut, then sums.
-    fn split(
+    pub fn sums(
         &self,
-        exits: &[Exit],
-        keys: &[u64],
-        order: &mut [u32],
-        buffer: &mut Buffer,
+        (model, envelope): (&dyn Bssrdf, &Envelope),
+        tuning: Tuning,
+        (exits, keys): (&[Exit], &[u64]),
+        (scratch, tally): (&mut Scratch, &mut GatherTally),
         out: &mut [[f64; 3]],
-        work: &mut CutWork,
     ) {
+        let mut order: Vec<u32> = (0..exits.len() as u32).collect();
+        Sums { cut: self, model, envelope, tuning, exits, keys, scratch, tally, out }.split(&mut order);
+    }
+}
+
+/// Sums under way.
+struct Sums<'a> {
+    cut: &'a Cut,
+    model: &'a dyn Bssrdf,
+    envelope: &'a Envelope,
+    tuning: Tuning,
+    exits: &'a [Exit],
+    keys: &'a [u64],
+    scratch: &'a mut Scratch,
+    tally: &'a mut GatherTally,
+    out: &'a mut [[f64; 3]],
+}
+
+impl Sums<'_> {
+    /// Halves `order` at medians until the exits are few and near enough to share a cut, then sums.
+    fn split(&mut self, order: &mut [u32]) {
         let Some(&first) = order.first() else { return };
+        let exits = self.exits;
         let at = |i: &u32| exits[*i as usize].x;
         let (lower, upper) = order.iter().fold((at(&first), at(&first)), |(l, u), i| (l.min(at(i)), u.max(at(i))));
         if order.len() <= GROUP {
             let centre = 0.5 * (lower + upper);
             let radius = order.iter().map(|i| at(i).distance(centre)).fold(0.0, f32::max);
-            self.collect(exits, order, &Ball { centre, radius }, buffer, work);
-            if order.len() == 1 || buffer.picked.len() + buffer.far.len() <= LONG {
-                self.sum(exits, keys[first as usize], order, buffer, out, work);
+            self.collect(order, &Ball { centre, radius });
+            if order.len() == 1 || self.scratch.picked.len() + self.scratch.far.len() <= LONG {
+                self.sum(self.keys[first as usize], order);
                 return;
             }
         }
@@ -123,91 +123,81 @@ impl Cut<'_> {
         let middle = order.len() / 2;
         order.select_nth_unstable_by(middle, |a, b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(b)));
         let (left, right) = order.split_at_mut(middle);
-        self.split(exits, keys, left, buffer, out, work);
-        self.split(exits, keys, right, buffer, out, work);
+        self.split(left);
+        self.split(right);
     }
 
     /// The cut of a group: samples near it and nodes far from it.
-    fn collect(&self, exits: &[Exit], order: &[u32], ball: &Ball, buffer: &mut Buffer, work: &mut CutWork) {
+    fn collect(&mut self, order: &[u32], ball: &Ball) {
         // The darkest of some exits decides how fine the cut is.
         let step = order.len().div_ceil(GUESSES);
         let mut least = Vec4::splat(f32::INFINITY);
         for &i in order.iter().step_by(step) {
-            least = least.min(self.guess(exits[i as usize].x, work));
+            least = least.min(self.guess(self.exits[i as usize].x));
         }
+        let Tuning { error, floor, .. } = self.tuning;
         // A channel that is dark beside the others, or where the whole surface is brighter, need not be finer than they are.
-        least = least.max(Vec4::splat(DARK_CHANNEL * least.max_element())).max(self.floor);
+        least = least.max(Vec4::splat(DARK_CHANNEL * least.max_element())).max(floor);
         // Channels without light must not open anything.
-        let limit = Vec4::from_array(least.to_array().map(|g| if g > 0.0 { 1.0 / (self.error * g) } else { 0.0 }));
-        buffer.picked.clear();
-        buffer.far.clear();
+        let limit = Vec4::from_array(least.to_array().map(|g| if g > 0.0 { 1.0 / (error * g) } else { 0.0 }));
+        let Scratch { picked, far, .. } = &mut *self.scratch;
+        picked.clear();
+        far.clear();
         let mut at = 0;
-        while let Some(node) = self.tree.nodes.get(at) {
-            work.nodes += 1;
-            let open = self.opens(node, ball, limit);
+        while let Some(node) = self.cut.tree.nodes.get(at) {
+            self.tally.nodes += 1;
+            let open = opens(self.envelope, node, ball, limit);
             if open && node.is_leaf() {
-                buffer.picked.extend((node.first..node.first + node.count).map(|i| (i, 1.0)));
+                picked.extend((node.first..node.first + node.count).map(|i| (i, 1.0)));
                 at += 1;
             } else if open {
                 at += 1;
             } else {
-                buffer.far.push(at as u32);
+                far.push(at as u32);
                 at = node.skip as usize;
             }
         }
     }
 
     /// Draws a member of each far node, and sums for each exit of the group.
-    fn sum(
-        &self,
-        exits: &[Exit],
-        key: u64,
-        order: &[u32],
-        buffer: &mut Buffer,
-        out: &mut [[f64; 3]],
-        work: &mut CutWork,
-    ) {
-        work.evaluated += (buffer.picked.len() + buffer.far.len()) as u64 * order.len() as u64;
-        if let Some(clusters) = self.clusters {
-            let far: Vec<(u32, f32)> = buffer.far.iter().map(|&at| (at, 1.0)).collect();
-            buffer.clusters.pick(clusters, &far);
-        } else {
+    fn sum(&mut self, key: u64, order: &[u32]) {
+        let Cut { tree, clusters } = self.cut;
+        let Scratch { columns, clusters: means, picked, far, exits, sums } = &mut *self.scratch;
+        let evaluated = (picked.len() + far.len()) as u64 * order.len() as u64;
+        self.tally.pairs += evaluated;
+        self.tally.evaluated += evaluated;
+        exits.clear();
+        exits.extend(order.iter().map(|&i| self.exits[i as usize]));
+        sums.clear();
+        sums.resize(order.len(), [0.0; 3]);
+        if clusters.is_none() {
             // One after the other, so that their visits to memory overlap.
-            for &at in &buffer.far {
-                buffer.picked.extend(self.tree.draw(&self.tree.nodes[at as usize], uniform(key, at as usize)));
+            for &at in &*far {
+                picked.extend(tree.draw(&tree.nodes[at as usize], uniform(key, at as usize)));
             }
         }
-        buffer.columns.pick(&self.tree.columns, &buffer.picked);
-        for &i in order {
-            let exit = &exits[i as usize];
-            let mut sum = buffer.columns.sum(self.model, exit, self.partition, &mut work.clamped);
-            if self.clusters.is_some() {
-                let far = buffer.clusters.sum(self.model, exit, self.partition, &mut work.clamped);
-                sum.iter_mut().zip(far).for_each(|(sum, far)| *sum += far);
+        columns.pick(&tree.columns, picked);
+        let partition = self.tuning.partition;
+        self.tally.clamped += columns.sum(self.model, exits, partition, sums);
+        for (&i, sum) in order.iter().zip(&*sums) {
+            self.out[i as usize] = *sum;
+        }
+        if let Some(clusters) = clusters {
+            let far: Vec<(u32, f32)> = far.iter().map(|&at| (at, 1.0)).collect();
+            means.pick(clusters, &far);
+            self.tally.clamped += means.sum(self.model, exits, partition, sums);
+            for (&i, sum) in order.iter().zip(&*sums) {
+                self.out[i as usize].iter_mut().zip(sum).for_each(|(all, far)| *all += far);
             }
-            out[i as usize] = sum;
         }
-    }
-
-    /// True if one member may not stand for the node.
-    #[inline]
-    fn opens(&self, node: &Node, ball: &Ball, limit: Vec4) -> bool {
-        let near = node.centre.distance(ball.centre) - ball.radius - node.reach;
-        if near <= 0.0 {
-            return true;
-        }
-        let fall = self.envelope.at(near * near);
-        let relative = fall.slope * node.spread + fall.value * self.envelope.other;
-        let deviation = relative * node.weight + fall.value * node.uneven;
-        (deviation * limit).cmpgt(Vec4::ONE).any()
     }
 
     /// The sum from centres of nodes, good to some ten percent.
-    fn guess(&self, x: Vec3, work: &mut CutWork) -> Vec4 {
+    fn guess(&mut self, x: Vec3) -> Vec4 {
         let mut sum = Vec4::ZERO;
         let mut at = 0;
-        while let Some(node) = self.tree.nodes.get(at) {
-            work.nodes += 1;
+        while let Some(node) = self.cut.tree.nodes.get(at) {
+            self.tally.nodes += 1;
             let d2 = node.centre.distance_squared(x);
             let s2 = node.spread * node.spread;
             if s2 > GUESS * GUESS * d2 && !node.is_leaf() {
@@ -220,6 +210,19 @@ impl Cut<'_> {
         }
         sum
     }
+}
+
+/// True if one member may not stand for the node.
+#[inline]
+fn opens(envelope: &Envelope, node: &Node, ball: &Ball, limit: Vec4) -> bool {
+    let near = node.centre.distance(ball.centre) - ball.radius - node.reach;
+    if near <= 0.0 {
+        return true;
+    }
+    let fall = envelope.at(near * near);
+    let relative = fall.slope * node.spread + fall.value * envelope.other;
+    let deviation = relative * node.weight + fall.value * node.uneven;
+    (deviation * limit).cmpgt(Vec4::ONE).any()
 }
 
 /// Uniform in [0, 1), a pure function of the exit's key and the node.

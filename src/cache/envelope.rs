@@ -1,7 +1,7 @@
 //! How fast S_d falls with the distance, in a table: what decides where a cut may be coarse. Only the noise of an estimate
 //! depends on it, never its mean.
 
-use crate::bssrdf::{BetterDipole, Model, Partition, Radial};
+use crate::bssrdf::{BetterDipole, Bssrdf, Partition, Radial};
 use crate::math::Vec4;
 use crate::optics::Medium;
 
@@ -43,14 +43,10 @@ fn first_row(medium: &Medium) -> u32 {
 
 impl Envelope {
     /// Of `model` of `medium`. Models of more than the distance take the better dipole's.
-    pub fn new(model: &Model, medium: &Medium) -> Self {
+    pub fn new(model: &dyn Bssrdf, medium: &Medium) -> Self {
         let proxy = BetterDipole::new(medium, true);
         let radial: &dyn Radial = model.radial().unwrap_or(&proxy);
-        let other = match model {
-            Model::Beam(_) => 0.8,
-            Model::Directional(_) => 0.3,
-            _ => 0.0,
-        };
+        let other = model.variation();
         let count = 2 * OCTAVES * STEPS;
         let first = first_row(medium);
         let distance = |i: u32| f32::from_bits((first + i) << SHIFT).sqrt();

@@ -1,7 +1,7 @@
 //! The estimators by name: what each prepares once a pass, and the sum at an exit.
 
-use super::{Buffer, Cache, Columns, Cut, Envelope, GatherTally, Thinning, Tree, notes, thinned};
-use crate::bssrdf::{Bssrdf, Exit, Model, ModelVisitor, Partition};
+use super::{Cache, Columns, Cut, Envelope, GatherTally, Scratch, Thinning, notes, thinned};
+use crate::bssrdf::{Bssrdf, Exit, Partition};
 use crate::math::{Rgb, Vec4};
 use crate::scene::Estimator;
 
@@ -29,66 +29,41 @@ impl Tuning {
 /// A cache made ready for one estimator.
 pub struct Gatherer {
     attempted: u32,
-    prepared: Prepared,
+    estimate: Estimate,
     tuning: Tuning,
 }
 
-enum Prepared {
+enum Estimate {
     Notes(Cache),
     Thinned(Box<Thinning>),
     All(Box<Columns>),
-    Cut(Box<Cutting>),
-}
-
-/// A tree, and what stands for its nodes where no random member does.
-struct Cutting {
-    tree: Tree,
-    clusters: Option<Columns>,
-}
-
-/// Working space of one task, for one model after the other.
-#[derive(Default)]
-pub struct Scratch {
-    buffers: Vec<(std::mem::Discriminant<Model>, Buffer)>,
-}
-
-impl Scratch {
-    fn buffer(&mut self, model: &Model) -> &mut Buffer {
-        let kind = std::mem::discriminant(model);
-        let found = self.buffers.iter().position(|(k, _)| *k == kind);
-        let at = found.unwrap_or_else(|| {
-            self.buffers.push((kind, Buffer::new(model)));
-            self.buffers.len() - 1
-        });
-        &mut self.buffers[at].1
-    }
+    Cut(Box<Cut>),
 }
 
 impl Gatherer {
     /// Builds what `estimator` needs.
-    pub fn new(estimator: Estimator, cache: Cache, model: &Model, tuning: Tuning) -> Self {
+    pub fn new(estimator: Estimator, cache: Cache, model: &dyn Bssrdf, tuning: Tuning) -> Self {
         let attempted = cache.attempted.max(1);
         let plain = cache.lit.len() <= PLAIN_SUM;
-        let prepared = match estimator {
-            Estimator::Notes => Prepared::Notes(cache),
-            Estimator::Thinned => Prepared::Thinned(Box::new(Thinning::new(model, cache))),
+        let estimate = match estimator {
+            Estimator::Notes => Estimate::Notes(cache),
+            Estimator::Thinned => Estimate::Thinned(Box::new(Thinning::new(cache))),
             Estimator::Cut | Estimator::Cluster if !plain => {
-                let tree = Tree::new(&Columns::of(model, &cache.lit));
-                let clusters = (estimator == Estimator::Cluster).then(|| tree.clusters(model));
-                Prepared::Cut(Box::new(Cutting { tree, clusters }))
+                let samples = Columns::of(model, &cache.lit);
+                Estimate::Cut(Box::new(Cut::new(&samples, estimator == Estimator::Cluster)))
             }
             Estimator::All | Estimator::Cut | Estimator::Cluster => {
-                Prepared::All(Box::new(Columns::of(model, &cache.lit)))
+                Estimate::All(Box::new(Columns::of(model, &cache.lit)))
             }
         };
-        Self { attempted, prepared, tuning }
+        Self { attempted, estimate, tuning }
     }
 
     /// (1/M) Σ S_d L_t to each of `exits`, into `out`. `keys`, one for each exit, seed what is random; the same arguments
     /// give the same bits.
     pub fn gather(
         &self,
-        (model, envelope): (&Model, &Envelope),
+        (model, envelope): (&dyn Bssrdf, &Envelope),
         exits: &[Exit],
         keys: &[u64],
         scratch: &mut Scratch,
@@ -97,64 +72,28 @@ impl Gatherer {
     ) {
         out.clear();
         tally.exits += exits.len() as u64;
-        let Tuning { error, floor, partition } = self.tuning;
-        let attempted = f64::from(self.attempted);
-        let mean = |sum: [f64; 3]| Rgb::from_fn(|c| (sum[c] / attempted) as f32);
+        let mut sums = vec![[0.0; 3]; exits.len()];
+        let mut tuning = self.tuning;
         let each = exits.iter().zip(keys);
-        match &self.prepared {
-            Prepared::Notes(cache) => {
-                out.extend(each.map(|(exit, &key)| model.visit(Notes { cache, exit, key, tally })));
+        match &self.estimate {
+            Estimate::Notes(cache) => out.extend(each.map(|(exit, &key)| notes(cache, model, exit, key, tally))),
+            Estimate::Thinned(samples) => {
+                out.extend(each.map(|(exit, &key)| thinned(samples, model, exit, key, tally)));
             }
-            Prepared::Thinned(thinning) => {
-                out.extend(each.map(|(exit, &key)| model.visit(Thinned { thinning, exit, key, tally })));
-            }
-            Prepared::All(columns) => {
+            Estimate::All(columns) => {
                 let count = columns.len() as u64 * exits.len() as u64;
                 tally.pairs += count;
                 tally.evaluated += count;
-                let mut sum = |exit| columns.sum(model, exit, partition, &mut tally.clamped);
-                out.extend(exits.iter().map(|exit| mean(sum(exit))));
+                tally.clamped += columns.sum(model, exits, tuning.partition, &mut sums);
             }
-            Prepared::Cut(cutting) => {
-                let Cutting { tree, clusters } = &**cutting;
-                let mut sums = vec![[0.0; 3]; exits.len()];
-                let floor = floor * attempted as f32;
-                let cut = Cut { tree, clusters: clusters.as_ref(), model, envelope, error, floor, partition };
-                let work = cut.sums(exits, keys, scratch.buffer(model), &mut sums);
-                tally.nodes += work.nodes;
-                tally.pairs += work.evaluated;
-                tally.evaluated += work.evaluated;
-                tally.clamped += work.clamped;
-                out.extend(sums.into_iter().map(mean));
+            Estimate::Cut(cut) => {
+                tuning.floor *= self.attempted as f32;
+                cut.sums((model, envelope), tuning, (exits, keys), (scratch, tally), &mut sums);
             }
         }
-    }
-}
-
-struct Notes<'a> {
-    cache: &'a Cache,
-    exit: &'a Exit,
-    key: u64,
-    tally: &'a mut GatherTally,
-}
-
-impl ModelVisitor for Notes<'_> {
-    type Out = Rgb;
-    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-        notes(self.cache, model, self.exit, self.key, self.tally)
-    }
-}
-
-struct Thinned<'a> {
-    thinning: &'a Thinning,
-    exit: &'a Exit,
-    key: u64,
-    tally: &'a mut GatherTally,
-}
-
-impl ModelVisitor for Thinned<'_> {
-    type Out = Rgb;
-    fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-        thinned(self.thinning, model, self.exit, self.key, self.tally)
+        if out.is_empty() {
+            let attempted = f64::from(self.attempted);
+            out.extend(sums.iter().map(|sum| Rgb::from_fn(|c| (sum[c] / attempted) as f32)));
+        }
     }
 }

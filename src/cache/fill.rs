@@ -1,7 +1,7 @@
 //! Filling the cache: random triangle by area, random point in it, a direction, what light arrives, what enters.
 
 use super::{Cache, CachedSample, Density};
-use crate::bssrdf::{Entry, Model};
+use crate::bssrdf::{Bssrdf, Entry};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Arrival, Lights, emitted};
 use crate::math::Rgb;
@@ -25,7 +25,7 @@ pub struct Filler<'a> {
     /// Its area table; cached points are relative to its centre.
     pub table: &'a AreaTable,
     /// Its BSSRDF, which says at what depth a sample stands.
-    pub model: &'a Model,
+    pub model: &'a dyn Bssrdf,
     /// Its relative index of refraction.
     pub eta: f32,
     /// How directions are picked.

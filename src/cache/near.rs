@@ -2,7 +2,7 @@
 //! sample of a cache.
 
 use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally, Shadow};
-use crate::bssrdf::{Exit, Partition};
+use crate::bssrdf::{Exit, Layout, Partition};
 use crate::math::{DVec3, Frame, Rgb, Vec3};
 use crate::query::{Hit, Ray, RayTally};
 use crate::sampling::PixelStream;
@@ -139,7 +139,7 @@ impl NearField {
         sums: &mut [Rgb],
     ) {
         let (start, before) = (Instant::now(), clock.rays);
-        let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model));
+        let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model.layout()));
         let mut picked = Vec::new();
         let groups = exits.chunks(GROUP).zip(places.chunks(GROUP));
         for (((exits, places), streams), sums) in groups.zip(streams.chunks(GROUP)).zip(sums.chunks_mut(GROUP)) {
@@ -160,8 +160,9 @@ impl NearField {
                 picked.retain(|(_, way)| way.length_squared() < self.radius * self.radius);
                 gather.near += picked.len() as u64;
                 own.pick_moved(&all, &picked);
-                let value = own.sum(filler.model, &exit, self.partition, &mut gather.clamped);
-                *sum += Rgb::from_fn(|c| value[c] as f32);
+                let mut value = [[0.0; 3]];
+                gather.clamped += own.sum(filler.model, &[exit], self.partition, &mut value);
+                *sum += Rgb::from_fn(|c| value[0][c] as f32);
             }
         }
         clock.near += start.elapsed().as_secs_f64() - (clock.rays - before);
@@ -266,7 +267,7 @@ impl NearField {
         let mut found: Vec<Found> = Vec::with_capacity(candidates.len());
         let (mut last, mut density) = (0, 0.0);
         // Where the distance alone decides, all light at one point is one sample.
-        let joined = filler.model.gather().is_some();
+        let joined = filler.model.layout() == Layout::POINTS;
         for Candidate { surface, n_geometric, place, mut sample, shadow } in candidates {
             if let Some(shadow) = shadow {
                 let open = hidden.next() == Some(false);

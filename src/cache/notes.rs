@@ -7,7 +7,7 @@ use crate::math::{Rgb, hash};
 /// (1/M) Σ S_d L_t over all cached samples, each kept with probability exp(-σ_tr d) and then weighted by its inverse
 /// [Frisvad, "Subsurface Scattering", rejection control]. σ_tr is the smallest of the three channels': with
 /// the mean or the largest the least absorbing channel has infinite variance. `key` seeds the decisions.
-pub fn notes<B: Bssrdf>(cache: &Cache, model: &B, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
+pub fn notes(cache: &Cache, model: &dyn Bssrdf, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
     let decay = model.decay();
     let mut sum = [0.0_f64; 3];
     let (mut evaluated, clamps) = (0, model.clamps());

@@ -1,7 +1,7 @@
 //! The lecture's estimator without looking at every sample.
 
 use super::{Cache, CachedSample, Columns, GatherTally, Tree};
-use crate::bssrdf::{Bssrdf, Exit, Model};
+use crate::bssrdf::{Bssrdf, Exit};
 use crate::math::{Rgb, hash};
 
 /// Nodes are opened where that spares more trials than this.
@@ -16,8 +16,8 @@ pub struct Thinning {
 
 impl Thinning {
     /// Builds the tree.
-    pub fn new(model: &Model, cache: Cache) -> Self {
-        let (tree, order) = Tree::ordered(&Columns::points(model, &cache.lit));
+    pub fn new(cache: Cache) -> Self {
+        let (tree, order) = Tree::ordered(&Columns::points(&cache.lit));
         let samples = order.iter().map(|&i| cache.lit[i as usize]).collect();
         Self { samples, attempted: cache.attempted, tree }
     }
@@ -26,7 +26,7 @@ impl Thinning {
 /// (1/M) Σ S_d L_t, each sample kept with probability exp(-σ_tr d) independently of the others and weighted by its inverse:
 /// exactly the law of [`super::notes`]. All members of a node are kept with at most the probability of its nearest point;
 /// the next one that passes this bound is found by one geometric jump, and then kept with what is left of its own.
-pub fn thinned<B: Bssrdf>(thinning: &Thinning, model: &B, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
+pub fn thinned(thinning: &Thinning, model: &dyn Bssrdf, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
     let decay = model.decay();
     let clamps = model.clamps();
     let (mut sum, mut numbers) = ([0.0_f64; 3], Numbers { key, next: 0 });

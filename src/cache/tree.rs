@@ -1,7 +1,6 @@
 //! A binary tree over the samples of one pass, split at medians, in the order in which it is walked.
 
 use super::Columns;
-use crate::bssrdf::Model;
 use crate::math::{Vec3, Vec4};
 
 /// Samples of a leaf, but for the last.
@@ -87,10 +86,10 @@ impl Tree {
     }
 
     /// One sample for each node, in their order: the mean of its members, as they are drawn, with their whole weight.
-    pub fn clusters(&self, model: &Model) -> Columns {
+    pub fn clusters(&self) -> Columns {
         let mass = |i: usize| self.cumulative[i + 1] - self.cumulative[i];
         let ranges = self.nodes.iter().map(|n| n.first as usize..(n.first + n.count) as usize);
-        self.columns.means(model, ranges, mass)
+        self.columns.means(ranges, mass)
     }
 
     /// Bytes of nodes, tables and columns.

@@ -1,7 +1,7 @@
 //! `marmor eval`.
 
 use super::stdout;
-use marmor::bssrdf::{KappaExtinction, ModelName, WidthFit};
+use marmor::bssrdf::{KappaExtinction, ModelName, ModelOptions, WidthFit};
 use marmor::report::{Batch, BatchOptions};
 use marmor::{Error, Result};
 use std::io::{self, BufRead, Read, Write};
@@ -61,21 +61,25 @@ const BUFFER: usize = 1 << 18;
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let refuse = |given: bool, option: &str, model: ModelName| {
-        if given && args.model != model {
-            return Err(Error::usage(format!("{option} goes with --model {}", model.name())));
+    let refuse = |given: bool, option: &str| {
+        if given && !args.model.takes(option) {
+            let takers: Vec<&str> = ModelName::models().filter(|m| m.takes(option)).map(ModelName::name).collect();
+            return Err(Error::usage(format!("--{option} goes with --model {}", takers.join(" or "))));
         }
         Ok(())
     };
-    refuse(args.calibrated, "--calibrated", ModelName::Directional)?;
-    refuse(args.kappa_full, "--kappa-full", ModelName::Beam)?;
-    refuse(args.transmitted, "--transmitted", ModelName::Slab)?;
-    refuse(args.width.is_some(), "--width", ModelName::Normalised)?;
+    refuse(args.calibrated, "calibrated")?;
+    refuse(args.kappa_full, "kappa-full")?;
+    refuse(args.transmitted, "transmitted")?;
+    refuse(args.width.is_some(), "width")?;
     let options = BatchOptions {
         model: args.model,
-        exit_normalisation: !args.no_exit_normalisation,
-        calibrated: args.calibrated,
-        kappa: if args.kappa_full { KappaExtinction::Full } else { KappaExtinction::Reduced },
+        made: ModelOptions {
+            exit_normalisation: !args.no_exit_normalisation,
+            calibrated: args.calibrated,
+            kappa: if args.kappa_full { KappaExtinction::Full } else { KappaExtinction::Reduced },
+            ..ModelOptions::DEFAULT
+        },
         width: args.width.unwrap_or(WidthFit::DiffusionLength),
         transmitted: args.transmitted,
         clamped: args.clamped,

@@ -2,7 +2,7 @@
 
 use super::stdout;
 use clap::builder::NonEmptyStringValueParser;
-use marmor::bssrdf::{Bssrdf, DirectionalDipole, Model, ModelName, ModelVisitor};
+use marmor::bssrdf::{ModelName, ModelOptions};
 use marmor::film::{check_replaceable, write_atomically};
 use marmor::math::Rgb;
 use marmor::optics::{self, Measured, Medium};
@@ -64,15 +64,13 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let row = row.map_err(|e| Error::usage(format!("--material: {e}")))?;
     let medium = medium(&args, row)?;
     let mut profile = Profile::new(medium, args.unit_of_r, row, args.r.map(|r| r.0));
-    let models = if args.model.is_empty() { half_space_models() } else { args.model };
+    let options = ModelOptions { calibrated: args.calibrated, ..ModelOptions::DEFAULT };
+    let models = if args.model.is_empty() { ModelName::half_spaces().collect() } else { args.model };
     for name in models {
-        if name == ModelName::Directional && args.calibrated {
-            profile.add("directional, calibrated", &DirectionalDipole::new(&medium, true));
-        } else {
-            let model = Model::with_thickness(name, &medium, None, true).map_err(|e| Error::usage(e.to_string()))?;
-            let name = model.name().name();
-            model.visit(Add { profile: &mut profile, name });
-        }
+        let model = name.build(&medium, &options).map_err(|e| Error::usage(e.to_string()))?;
+        let (name, variant) = (model.name(), if args.calibrated { ", calibrated" } else { "" });
+        let variant = if name.takes("calibrated") { variant } else { "" };
+        profile.add(&format!("{}{variant}", name.name()), &*model);
     }
     match args.output.as_deref() {
         None => stdout::write(format_args!("{}", profile.to_csv())),
@@ -93,22 +91,6 @@ fn medium(args: &Args, row: Option<&Measured>) -> Result<Medium> {
     };
     let sigma_s = Rgb(s.map(|v| (v / (1.0 - args.g)) as f32));
     Medium::unreduced(sigma_s, Rgb(a.map(|v| v as f32)), args.g, eta as f32).map_err(|e| Error::usage(e.to_string()))
-}
-
-fn half_space_models() -> Vec<ModelName> {
-    ModelName::ALL.into_iter().filter(|m| !matches!(m, ModelName::Slab | ModelName::Auto)).collect()
-}
-
-struct Add<'a> {
-    profile: &'a mut Profile,
-    name: &'static str,
-}
-
-impl ModelVisitor for Add<'_> {
-    type Out = ();
-    fn visit<B: Bssrdf>(self, model: &B) {
-        self.profile.add(self.name, model);
-    }
 }
 
 /// Whether a plot is asked for, or else a table.

@@ -261,7 +261,7 @@ impl MethodArgs {
         let mut keys = Vec::new();
         let mut put = |key: &str, value: Option<String>| keys.extend(value.map(|v| format!("{key}={v}")));
         put("method.name", self.method.map(|m| m.name().into()));
-        let model = if self.as_notes { Some(ModelName::Standard) } else { self.model };
+        let model = if self.as_notes { Some(ModelName::STANDARD) } else { self.model };
         put("method.model", model.map(|m| m.name().into()));
         put("method.estimator", self.estimator.map(|e| e.name().into()));
         put("render.seed", self.seed.map(|s| s.to_string()));

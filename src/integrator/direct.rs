@@ -2,7 +2,6 @@
 
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, KnownLights, Part, Tally, View};
-use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::error::Result;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
@@ -29,18 +28,11 @@ impl Direct {
 
 /// The Lambertian albedo that stands for each object's surface.
 pub(super) fn lambertian_albedos(scene: &Scene) -> Result<Vec<Rgb>> {
-    struct Total;
-    impl ModelVisitor for Total {
-        type Out = Rgb;
-        fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-            model.total()
-        }
-    }
     let albedo = |surface: &Surface| {
         Ok(match surface {
             Surface::Diffuse { albedo } => *albedo,
             Surface::Emissive { .. } => Rgb::BLACK,
-            Surface::Translucent(t) => t.build()?.visit(Total),
+            Surface::Translucent(t) => t.build()?.total(),
         })
     };
     scene.objects.iter().map(|o| albedo(&scene.materials[o.material].surface)).collect()

@@ -1,7 +1,7 @@
 //! The shape of a body around a place, and how far models can be trusted there.
 
 use super::View;
-use crate::bssrdf::{ExpectedError, ModelName, Place, Unmeasured, expected_error};
+use crate::bssrdf::{ExpectedError, ModelName, ModelOptions, Place, Unmeasured, expected_error};
 use crate::geometry::SurfacePoint;
 use crate::math::{Frame, Vec3};
 use crate::optics::{ChannelOptics, Medium};
@@ -39,9 +39,14 @@ impl Candidate {
         let model = material.build().map_or(material.model, |model| model.name());
         Self {
             model,
-            calibrated: material.calibrated && model == ModelName::Directional,
-            thickness: material.thickness.filter(|_| model == ModelName::Slab),
+            calibrated: material.calibrated && model.takes("calibrated"),
+            thickness: material.thickness.filter(|_| model.takes("thickness")),
         }
+    }
+
+    /// As it is made.
+    pub fn options(self) -> ModelOptions {
+        ModelOptions { calibrated: self.calibrated, thickness: self.thickness, ..ModelOptions::DEFAULT }
     }
 
     /// Whether the two are the same but for the thickness.
@@ -151,7 +156,7 @@ impl LocalShape {
         }
         let mut worst: Option<(ExpectedError, Place)> = None;
         for place in self.places(local) {
-            let error = expected_error(candidate.model, candidate.calibrated, &place)?;
+            let error = expected_error(candidate.model, &candidate.options(), &place)?;
             if worst.is_none_or(|(e, _)| error.distribution > e.distribution) {
                 worst = Some((error, place));
             }

@@ -2,7 +2,6 @@
 
 use super::volume_path::VolumePath;
 use super::{CameraRay, Tally, View};
-use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::query::Hit;
@@ -20,15 +19,8 @@ impl Single {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, seed: u64) -> Result<Option<Self>> {
-        struct LeavesOut;
-        impl ModelVisitor for LeavesOut {
-            type Out = bool;
-            fn visit<B: Bssrdf>(self, model: &B) -> bool {
-                !model.claims().first_order
-            }
-        }
         let wanted = |object: &crate::scene::Object| match &scene.materials[object.material].surface {
-            Surface::Translucent(t) => t.build().map(|model| model.visit(LeavesOut)),
+            Surface::Translucent(t) => t.build().map(|model| !model.claims().first_order),
             _ => Ok(false),
         };
         let wanted: Vec<bool> = scene.objects.iter().map(wanted).collect::<Result<_>>()?;

@@ -4,7 +4,7 @@ use super::direct::lambertian_albedos;
 use super::shade::DirectLight;
 use super::single::Single;
 use super::{CameraRay, Integrator, KnownLights, Part, Tally, View};
-use crate::bssrdf::{Exit, Model, Partition};
+use crate::bssrdf::{Bssrdf, Exit, Partition};
 use crate::cache::{
     CachedSample, Clock, Density, Envelope, Filler, Gatherer, NearField, PLAIN_SUM, Scratch, Seen, Survey, Tuning, seen,
 };
@@ -92,7 +92,7 @@ struct Plan {
 /// A translucent object.
 struct Body {
     medium: Medium,
-    model: Model,
+    model: Box<dyn Bssrdf>,
     envelope: Envelope,
     table: AreaTable,
     /// Of even passes and of odd ones.
@@ -122,7 +122,7 @@ impl Subsurface {
             let Some(table) = AreaTable::new(&object.mesh) else { return Ok(None) };
             let stream = |seed| CacheStream::new(options.points, seed, index as u64);
             let model = t.build()?;
-            let envelope = Envelope::new(&model, &t.medium);
+            let envelope = Envelope::new(&*model, &t.medium);
             let streams = Turn::seeds(options.seed).map(stream);
             let cosine_share = object.mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds));
             let (near, samples) = near_field(&envelope, table.area(), &options);
@@ -159,7 +159,7 @@ impl Subsurface {
             lights: &self.light.lights,
             object: object as u32,
             table: &body.table,
-            model: &body.model,
+            model: &*body.model,
             eta: body.medium.eta,
             sampling: self.options.entry,
             cosine_share: body.cosine_share,
@@ -224,7 +224,7 @@ impl Subsurface {
             };
             let (exits, places): (Vec<Exit>, Vec<DVec3>) = group.iter().filter_map(exit).unzip();
             let keys: Vec<u64> = group.iter().map(|&(_, i)| rays[i].stream.key()).collect();
-            let kernel = (&body.model, &body.envelope);
+            let kernel = (&*body.model, &body.envelope);
             Clock::time(&mut tally.clock.gather, || {
                 gatherer.gather(kernel, &exits, &keys, &mut scratch, &mut tally.gather, &mut found);
             });
@@ -352,7 +352,7 @@ impl Integrator for Subsurface {
             tally.gather.samples += u64::from(count);
             tally.gather.lit += cache.lit.len() as u64;
             let tuning = self.tuning(body, &plans[object], pass);
-            let ready = || Gatherer::new(self.options.estimator, cache, &body.model, tuning);
+            let ready = || Gatherer::new(self.options.estimator, cache, &*body.model, tuning);
             Some(Clock::time(&mut tally.clock.tree, ready))
         };
         self.bodies.iter().enumerate().map(fill).collect()

@@ -103,10 +103,10 @@ const MOSTLY: f64 = 0.5;
 
 /// Candidates beside the material's own model, and a slab where the body is one.
 const CANDIDATES: [Candidate; 4] = [
-    Candidate { model: ModelName::Beam, calibrated: false, thickness: None },
-    Candidate { model: ModelName::Better, calibrated: false, thickness: None },
-    Candidate { model: ModelName::Standard, calibrated: false, thickness: None },
-    Candidate { model: ModelName::Directional, calibrated: true, thickness: None },
+    Candidate { model: ModelName::BEAM, calibrated: false, thickness: None },
+    Candidate { model: ModelName::BETTER, calibrated: false, thickness: None },
+    Candidate { model: ModelName::STANDARD, calibrated: false, thickness: None },
+    Candidate { model: ModelName::DIRECTIONAL, calibrated: true, thickness: None },
 ];
 
 impl Trustworthiness {
@@ -145,7 +145,7 @@ impl Trustworthiness {
         let albedos =
             || shape.optics().iter().filter(|k| k.transport_mean_free_path.is_finite()).map(|k| k.alpha_prime);
         let moments = FresnelMoments::new(shape.eta());
-        let normalised = material.exit_normalisation || own.model == ModelName::Directional;
+        let normalised = own.model.normalises_exit(material.exit_normalisation);
         let verdict = match models[0].1.beyond {
             _ if object.findings.inside_out() => Verdict::InsideOut,
             _ if open > MOSTLY || is_sheet(view.scene, &object.name) => Verdict::Open,
@@ -210,7 +210,7 @@ fn as_slab(closed: &[Local], all: usize) -> Option<Candidate> {
     let middle = *sorted.get(sorted.len() / 2)?;
     let flat = |l: &&Local| (l.thickness - middle).abs() < 0.05 * middle && l.curvature.abs() * middle < 0.2;
     let share = closed.iter().filter(flat).count() as f64 / all as f64;
-    (share > NEARLY_ALL).then_some(Candidate { model: ModelName::Slab, calibrated: false, thickness: Some(middle) })
+    (share > NEARLY_ALL).then_some(Candidate { model: ModelName::SLAB, calibrated: false, thickness: Some(middle) })
 }
 
 /// Whether it has been found to have no inside.
@@ -262,14 +262,14 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// Thickness [transport mean free paths of `path`] above which a flat sheet is within the tolerance of a model that knows no
 /// thickness.
 fn trusted_from(shape: &LocalShape, candidate: Candidate, tolerance: f64, path: f64) -> Option<f64> {
-    if candidate.model == ModelName::Slab {
+    if candidate.model.takes("thickness") {
         return None;
     }
     let wrong = |paths: f64| {
         let some = shape.optics().iter().filter(|k| k.transport_mean_free_path.is_finite());
         some.map(|k| {
             let place = Place::new(k, shape.eta(), paths * path, 0.0);
-            expected_error(candidate.model, candidate.calibrated, &place).map_or(f64::INFINITY, |e| e.distribution)
+            expected_error(candidate.model, &candidate.options(), &place).map_or(f64::INFINITY, |e| e.distribution)
         })
         .fold(0.0, f64::max)
             > tolerance

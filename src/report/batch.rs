@@ -1,7 +1,7 @@
 //! Rows of a CSV in, the same rows with S_d out: the models' rendering code for scripts and tests.
 
 use super::batch_model::{Inputs, Place, Prepared, Substance};
-use crate::bssrdf::{KappaExtinction, ModelName, WidthFit};
+use crate::bssrdf::{ModelName, ModelOptions, WidthFit};
 use crate::error::did_you_mean;
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -15,12 +15,8 @@ const KEPT_MODELS: usize = 1024;
 pub struct BatchOptions {
     /// The model.
     pub model: ModelName,
-    /// See [`Model::new`].
-    pub exit_normalisation: bool,
-    /// `directional` scaled to the true albedo.
-    pub calibrated: bool,
-    /// The extinction in the near-field correction of `beam`.
-    pub kappa: KappaExtinction,
+    /// How it is made; thickness and far index are a row's own.
+    pub made: ModelOptions,
     /// The fit that makes a width of the columns `A` and `l`, model `normalised`.
     pub width: WidthFit,
     /// Rows with r: exit by the far face of the `slab`.
@@ -36,9 +32,7 @@ impl BatchOptions {
     pub fn new(model: ModelName) -> Self {
         Self {
             model,
-            exit_normalisation: true,
-            calibrated: false,
-            kappa: KappaExtinction::default(),
+            made: ModelOptions::DEFAULT,
             width: WidthFit::DiffusionLength,
             transmitted: false,
             clamped: false,
@@ -190,7 +184,7 @@ impl Columns {
                 0
             })
         };
-        let profile = model == ModelName::Normalised && at("sigma_s").is_none() && at("A").is_some();
+        let profile = model.takes("width") && at("sigma_s").is_none() && at("A").is_some();
         let (substance, eta) = if profile {
             (SubstanceColumns::Profile(["A", "l"].map(&mut need)), at("eta"))
         } else {
@@ -203,9 +197,10 @@ impl Columns {
             let either = at("r").map_or("r` (or `x,y,z,nix,niy,niz,nox,noy,noz,wx,wy,wz`)", |_| "r");
             PlaceColumns::Plane(need(either))
         };
-        let (slab, heeds) = (model == ModelName::Slab, model == ModelName::Slab || model == ModelName::Auto);
-        let thickness = if slab { Some(need("thickness")) } else { at("thickness").filter(|_| heeds) };
-        let eta_far = at("eta_far").filter(|_| slab);
+        let two_faces = model.takes("eta_far");
+        let thickness = at("thickness").filter(|_| model.takes("thickness"));
+        let thickness = if two_faces { Some(need("thickness")) } else { thickness };
+        let eta_far = at("eta_far").filter(|_| two_faces);
         if missing.is_empty() {
             return Ok(Self { substance, eta, thickness, eta_far, place, count: names.len() });
         }
@@ -240,7 +235,7 @@ mod tests {
     use super::*;
 
     fn run(header: &str, rows: &[&str]) -> Result<Vec<String>> {
-        run_with(BatchOptions::new(ModelName::Standard), header, rows)
+        run_with(BatchOptions::new(ModelName::STANDARD), header, rows)
     }
 
     fn run_with(options: BatchOptions, header: &str, rows: &[&str]) -> Result<Vec<String>> {
@@ -321,7 +316,7 @@ mod tests {
 
     #[test]
     fn a_slab_needs_its_thickness_and_has_two_faces() {
-        let mut options = BatchOptions::new(ModelName::Slab);
+        let mut options = BatchOptions::new(ModelName::SLAB);
         let missing = run_with(options, "sigma_s,sigma_a,g,eta,r", &[]).unwrap_err().to_string();
         assert!(missing.contains("lacks `thickness`"), "{missing}");
         let header = "sigma_s,sigma_a,g,eta,r,thickness,eta_far";
@@ -336,7 +331,7 @@ mod tests {
 
     #[test]
     fn single_scattering_is_appended_on_request() {
-        let mut options = BatchOptions::new(ModelName::Beam);
+        let mut options = BatchOptions::new(ModelName::BEAM);
         options.single = true;
         let batch = Batch::new("sigma_s,sigma_a,g,eta,r", options).unwrap();
         assert_eq!(batch.appended(), ",S_d,exitance,single");
@@ -350,7 +345,7 @@ mod tests {
 
     #[test]
     fn albedo_and_length_stand_for_coefficients() {
-        let mut options = BatchOptions::new(ModelName::Normalised);
+        let mut options = BatchOptions::new(ModelName::NORMALISED);
         // A (exp(-r/d) + exp(-r/3d)) / (8π d r) with d = l / s(A).
         for (fit, s) in
             [(WidthFit::Searchlight, 1.539), (WidthFit::Diffuse, 1.715), (WidthFit::DiffusionLength, 3.583_521)]
@@ -374,7 +369,7 @@ mod tests {
         let slab = ("sigma_s,sigma_a,g,eta,r,thickness,eta_far", "1,0.0001,0,2.5,5,1.5,1.5");
         let header = format!("sigma_s,sigma_a,g,eta,{}", GENERAL.join(","));
         let directional = (header.as_str(), "0.01,0.032,0,1,-12,0,0,0,0,1,0,0,1,0.932039,0,-0.362358");
-        for (model, (header, row)) in [(ModelName::Slab, slab), (ModelName::Directional, directional)] {
+        for (model, (header, row)) in [(ModelName::SLAB, slab), (ModelName::DIRECTIONAL, directional)] {
             let mut options = BatchOptions::new(model);
             let signed = last(&run_with(options, header, &[row]).unwrap()[0]);
             options.clamped = true;

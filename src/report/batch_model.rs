@@ -1,10 +1,7 @@
 //! From the numbers of one row of a batch to a model, and to the values at one pair of points.
 
 use super::BatchOptions;
-use crate::bssrdf::{
-    Bssrdf, ChannelMedium, DirectionalDipole, Entry, Exit, Model, ModelName, ModelVisitor, NormalisedDiffusion,
-    PhotonBeamDiffusion, SingleChannel, Slab,
-};
+use crate::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit, ModelOptions, NormalisedDiffusion, SingleChannel};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{FresnelMoments, Medium};
 use crate::{Error, Result};
@@ -57,20 +54,19 @@ impl Inputs {
             Substance::Profile { albedo, length: l } => {
                 let length = if l > 0.0 { l.log2().round().exp2() } else { 1.0 };
                 let (a, l) = (Rgb::splat(albedo as f32), Rgb::splat((l / length) as f32));
-                let normalised = options.exit_normalisation;
+                let normalised = options.made.exit_normalisation;
                 let model = NormalisedDiffusion::from_albedo(options.width, a, l, self.eta as f32, normalised)?;
-                (Model::Normalised(model), length, None)
+                (Box::new(model) as Box<dyn Bssrdf>, length, None)
             }
         };
-        // The directional dipole has the factor as published.
-        let normalised = options.exit_normalisation || model.name() == ModelName::Directional;
+        let normalised = model.name().normalises_exit(options.made.exit_normalisation);
         let eta = if options.transmitted { self.eta_far.unwrap_or(self.eta) } else { self.eta };
         let exit = if normalised { FresnelMoments::new(eta).four_c_phi_outside } else { 1.0 };
         Ok(Prepared { model, length, exit_factor: std::f64::consts::PI * exit, single })
     }
 
     /// The model and its unit of length.
-    fn of_coefficients(&self, typed: &ChannelMedium, options: BatchOptions) -> Result<(Model, f64)> {
+    fn of_coefficients(&self, typed: &ChannelMedium, options: BatchOptions) -> Result<(Box<dyn Bssrdf>, f64)> {
         for (name, value) in [("sigma_s", typed.sigma_s), ("sigma_a", typed.sigma_a)] {
             if value < 0.0 {
                 return Err(Error::scene(format!("{name} = {value} is negative")));
@@ -87,23 +83,14 @@ impl Inputs {
         }
         .checked()?;
         let thickness = self.thickness.map(|t| (t / length) as f32);
-        let eta_far = self.eta_far.unwrap_or(self.eta);
-        let normalised = options.exit_normalisation;
-        let model = match (options.model, thickness) {
-            (ModelName::Directional, _) => Model::Directional(DirectionalDipole::new(&medium, options.calibrated)),
-            (ModelName::Beam, _) => Model::Beam(PhotonBeamDiffusion::new(&medium, normalised, options.kappa)),
-            (ModelName::Slab, Some(thickness)) => {
-                Model::Slab(Box::new(Slab::between(&medium, thickness, eta_far as f32, normalised)?))
-            }
-            (name, thickness) => Model::with_thickness(name, &medium, thickness, normalised)?,
-        };
-        Ok((model, length))
+        let made = ModelOptions { thickness, eta_far: self.eta_far.map(|eta| eta as f32), ..options.made };
+        Ok((options.model.build(&medium, &made)?, length))
     }
 }
 
 /// A model in a unit of length near its transport mean free path, so that no input leaves the range of f32.
 pub(super) struct Prepared {
-    model: Model,
+    model: Box<dyn Bssrdf>,
     /// That unit: a power of two, which moves no digit of the input.
     length: f64,
     /// M over S_d: π 4 C_phi(1/eta) of the face it leaves by, or π without exit normalisation.
@@ -147,18 +134,10 @@ impl Place {
 impl Prepared {
     /// S_d [1/(unit² sr)] in the row's unit; `clamped` as rendering has it, else as the formula does.
     pub fn s_d(&self, place: &Place, clamped: bool) -> f64 {
-        struct Rendered(Entry, Exit);
-        impl ModelVisitor for Rendered {
-            type Out = Rgb;
-            fn visit<B: Bssrdf>(self, model: &B) -> Rgb {
-                model.eval(&self.0, &self.1)
-            }
-        }
         let x = Vec3::from(place.x.map(|c| (c / self.length) as f32));
         let entry = Entry { x: Vec3::ZERO, n: place.n_i, w: place.w };
         let exit = Exit { x, n: place.n_o, w: place.n_o };
-        let value =
-            if clamped { self.model.visit(Rendered(entry, exit)) } else { self.model.eval_signed(&entry, &exit) };
+        let value = if clamped { self.model.eval(&entry, &exit) } else { self.model.eval_signed(&entry, &exit) };
         f64::from(value[0]) / (self.length * self.length)
     }
 

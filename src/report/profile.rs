@@ -64,7 +64,7 @@ impl Profile {
     }
 
     /// Adds `model` under `name`, with exact single scattering where the model leaves it out; the curve's name says so.
-    pub fn add<B: Bssrdf>(&mut self, name: &str, model: &B) {
+    pub fn add(&mut self, name: &str, model: &dyn Bssrdf) {
         let exit_factor = PI * FresnelMoments::new(f64::from(self.medium.eta)).four_c_phi_outside;
         let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: -Vec3::Z };
         let single: Option<[SingleChannel; 3]> = (!model.claims().first_order)

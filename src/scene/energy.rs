@@ -2,7 +2,7 @@
 //! render, with the factor and a remedy.
 
 use super::{Object, Translucent};
-use crate::bssrdf::{Bssrdf, Model, ModelName, ModelVisitor, Place, SingleScattering, expected_error};
+use crate::bssrdf::{Bssrdf, Place, SingleScattering, expected_error};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, Medium};
 
@@ -20,10 +20,10 @@ type Untraceable<'a> = dyn Fn() -> Option<String> + 'a;
 pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>) -> Vec<String> {
     let Ok(model) = t.build() else { return Vec::new() };
     let shape = Shape::of(object);
-    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &model, shape, untraceable));
+    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &*model, shape, untraceable));
     // A thin body is the larger error, and has one remedy.
-    let nature = if sheet.is_none() { by_nature(t, &model, untraceable) } else { None };
-    sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &model, &shape, untraceable))).collect()
+    let nature = if sheet.is_none() { by_nature(t, &*model, untraceable) } else { None };
+    sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &*model, &shape, untraceable))).collect()
 }
 
 /// The sheet, rod or ball that a closed body is most like, from volume V, area S and the mean M of the curvature over it, all of
@@ -73,8 +73,8 @@ fn remedy(other: Option<String>, untraceable: &Untraceable<'_>) -> String {
 }
 
 /// A model of a half space lets light out through both faces of a sheet as if each were the only one.
-fn too_thin(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
-    if model.name() == ModelName::Slab {
+fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
+    if model.name().takes("thickness") {
         return None;
     }
     let (eta, optics) = (f64::from(t.medium.eta), ChannelOptics::of(&t.medium));
@@ -82,7 +82,7 @@ fn too_thin(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untrace
     let place = |k: &ChannelOptics| Place::new(k, eta, shape.thickness, shape.curvature);
     // Beyond the table its nearest end.
     let error =
-        |place: Place| expected_error(model.name(), t.calibrated, &place.nearest_measured()).unwrap_or_default();
+        |place: Place| expected_error(model.name(), &t.options(), &place.nearest_measured()).unwrap_or_default();
     let here = |k: &ChannelOptics| error(place(k));
     let factor = |k: &ChannelOptics| 1.0 + here(k).total;
     let plane = |k: &ChannelOptics| 1.0 + error(Place::new(k, eta, f64::INFINITY, 0.0)).total;
@@ -122,13 +122,13 @@ fn too_thin(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untrace
 
 /// More than all of the light, on a plane and without any absorption: `directional` as published, and models that add
 /// single scattering to a sum of all other orders that knows nothing of the phase function.
-fn by_nature(t: &Translucent, model: &Model, untraceable: &Untraceable<'_>) -> Option<String> {
+fn by_nature(t: &Translucent, model: &dyn Bssrdf, untraceable: &Untraceable<'_>) -> Option<String> {
     let clear = Translucent { medium: Medium { sigma_a: Rgb::BLACK, ..t.medium }, model: model.name(), ..t.clone() };
-    let total = furnace(&clear.medium, &clear.build().ok()?);
+    let total = furnace(&clear.medium, &*clear.build().ok()?);
     let (channel, factor) = largest(&t.medium, (0..3).map(|c| (c, f64::from(total[c]))))?;
     (factor > 1.0 + EXCESS).then(|| {
         let name = model.name().name();
-        let (why, remedy) = if model.name() == ModelName::Directional {
+        let (why, remedy) = if model.name().takes("calibrated") {
             ("as published".to_string(), "set calibrated = true, or take model `beam`".into())
         } else {
             let why = format!("with single scattering beside it, at g = {} and eta = {}", t.medium.g, t.medium.eta);
@@ -143,21 +143,14 @@ fn by_nature(t: &Translucent, model: &Model, untraceable: &Untraceable<'_>) -> O
 }
 
 /// What comes back of what has entered a plane along the normal, single scattering included where the renderer adds it.
-fn furnace(medium: &Medium, model: &Model) -> Rgb {
-    struct Total;
-    impl ModelVisitor for Total {
-        type Out = (Rgb, bool);
-        fn visit<B: Bssrdf>(self, model: &B) -> (Rgb, bool) {
-            (model.total(), model.claims().first_order)
-        }
-    }
-    let (total, first_order) = model.visit(Total);
-    if first_order { total } else { total + SingleScattering::new(medium).total() }
+fn furnace(medium: &Medium, model: &dyn Bssrdf) -> Rgb {
+    let total = model.total();
+    if model.claims().first_order { total } else { total + SingleScattering::new(medium).total() }
 }
 
 /// A slab of another thickness than the body's.
-fn other_slab(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
-    let told = f64::from(t.thickness.filter(|_| model.name() == ModelName::Slab)?);
+fn other_slab(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
+    let told = f64::from(t.thickness.filter(|_| model.name().takes("thickness"))?);
     let ratio = told / shape.thickness;
     (!(1.0 / OTHER_SLAB..=OTHER_SLAB).contains(&ratio)).then(|| {
         format!(
@@ -172,6 +165,7 @@ fn other_slab(t: &Translucent, model: &Model, shape: &Shape, untraceable: &Untra
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bssrdf::ModelName;
     use crate::geometry::{examine, rectangle, sphere};
     use crate::math::DVec3;
     use std::f64::consts::PI;
@@ -227,7 +221,7 @@ mod tests {
             source: String::new(),
         };
         let (thick, thin) = (cuboid([50.0, 20.0, 50.0]), cuboid([50.0, 0.2, 50.0]));
-        for model in [ModelName::Standard, ModelName::Better, ModelName::Beam, ModelName::Normalised, ModelName::Auto] {
+        for model in [ModelName::STANDARD, ModelName::BETTER, ModelName::BEAM, ModelName::NORMALISED, ModelName::AUTO] {
             assert_eq!(super::of(&of(model), &thick, &|| None), Vec::<String>::new(), "{model:?}");
             let said = super::of(&of(model), &thin, &|| None).join("\n");
             assert!(
@@ -238,6 +232,6 @@ mod tests {
             let crossed = super::of(&of(model), &thin, &|| Some("it passes through itself".into())).join("\n");
             assert!(crossed.ends_with("`volume_path` cannot trace it: it passes through itself"));
         }
-        assert!(super::of(&of(ModelName::Directional), &thick, &|| None)[0].contains("1.24 times"));
+        assert!(super::of(&of(ModelName::DIRECTIONAL), &thick, &|| None)[0].contains("1.24 times"));
     }
 }

@@ -3,7 +3,6 @@
 use super::file::SceneFile;
 use super::options::MethodName;
 use super::{Scene, Surface, Translucent, energy};
-use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::optics::{ChannelOptics, Trust};
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -36,15 +35,8 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
 
 /// Models of orders 2 and higher want single scattering beside them.
 pub(super) fn no_first_order(t: &Translucent) -> Option<String> {
-    struct FirstOrder;
-    impl ModelVisitor for FirstOrder {
-        type Out = bool;
-        fn visit<B: Bssrdf>(self, model: &B) -> bool {
-            model.claims().first_order
-        }
-    }
     let model = t.build().ok()?;
-    (!model.visit(FirstOrder)).then(|| {
+    (!model.claims().first_order).then(|| {
         let name = model.name().name();
         format!("`{name}` leaves out light scattered once, and `single = false` too: some 10 % of the light is missing")
     })

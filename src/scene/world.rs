@@ -1,7 +1,7 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
 use super::{Camera, Environment, Insides, Obstacle, ObstacleKind, Remark, doctor};
-use crate::bssrdf::{DirectionalDipole, Model, ModelName, choose};
+use crate::bssrdf::{Bssrdf, ModelName, ModelOptions, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
@@ -115,20 +115,24 @@ impl Translucent {
     ///
     /// # Errors
     /// A slab without a thickness, or one that is too thin for its medium.
-    pub fn build(&self) -> Result<Model> {
-        if self.model == ModelName::Directional && self.calibrated {
-            return Ok(Model::Directional(DirectionalDipole::new(&self.medium, true)));
-        }
-        Model::with_thickness(self.model, &self.medium, self.thickness, self.exit_normalisation)
+    pub fn build(&self) -> Result<Box<dyn Bssrdf>> {
+        self.model.build(&self.medium, &self.options())
+    }
+
+    /// What the model is made with.
+    pub fn options(&self) -> ModelOptions {
+        let &Self { exit_normalisation, thickness, calibrated, .. } = self;
+        ModelOptions { exit_normalisation, thickness, calibrated, ..ModelOptions::DEFAULT }
     }
 
     /// The model as logs and file headers name it: with its variant, and for `auto` the choice and the reason.
     pub fn model_text(&self) -> String {
-        match self.model {
-            ModelName::Auto => choose(&self.medium, self.thickness).to_string(),
-            ModelName::Directional if self.calibrated => "directional (calibrated)".into(),
-            ModelName::Slab => format!("slab ({} unit thick)", self.thickness.unwrap_or(f32::NAN)),
-            name => name.name().into(),
+        let name = self.model.name();
+        match self.thickness {
+            _ if self.model == ModelName::AUTO => choose(&self.medium, self.thickness).to_string(),
+            _ if self.calibrated && self.model.takes("calibrated") => format!("{name} (calibrated)"),
+            Some(thickness) if self.model.takes("thickness") => format!("{name} ({thickness} unit thick)"),
+            _ => name.into(),
         }
     }
 }

@@ -3,7 +3,7 @@
 //! absorption.
 
 use super::harness::{BALL, backends, render};
-use marmor::bssrdf::{Bssrdf, Model, ModelName, ModelVisitor, Radial, SingleScattering};
+use marmor::bssrdf::{ModelName, Radial, SingleScattering};
 use marmor::integrator::{Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, GaussLegendre, Rgb, Vec3};
 use marmor::optics::{Medium, transmittance};
@@ -138,21 +138,13 @@ fn single_on_a_plane(scene: &Scene) -> [f64; 3] {
     sum
 }
 
-struct Claim;
-
-impl ModelVisitor for Claim {
-    type Out = (Rgb, bool);
-    fn visit<B: Bssrdf>(self, model: &B) -> (Rgb, bool) {
-        (model.total(), model.claims().first_order)
-    }
-}
-
 /// The most that a model says comes back of what has entered, without absorption; at least 1.
 pub fn most(t: &Translucent) -> f64 {
     let name = t.build().unwrap().name();
     let clear = Translucent { model: name, medium: Medium { sigma_a: Rgb::BLACK, ..t.medium }, ..t.clone() };
-    let (total, first_order) = clear.build().unwrap().visit(Claim);
-    let single = if first_order { Rgb::BLACK } else { SingleScattering::new(&clear.medium).total() };
+    let model = clear.build().unwrap();
+    let total = model.total();
+    let single = if model.claims().first_order { Rgb::BLACK } else { SingleScattering::new(&clear.medium).total() };
     f64::from((total + single).max()).max(1.0)
 }
 
@@ -186,15 +178,15 @@ pub enum Of {
 
 /// Every model and its estimators.
 pub fn in_all_models(text: &str, of: Of) {
-    for name in ModelName::ALL.into_iter().filter(|name| *name != ModelName::Auto) {
+    for name in ModelName::models() {
         let Some(scene) = scene(text, name.name()) else { continue };
         let t = translucent(&scene);
         let model = t.build().unwrap();
         let most = most(t);
         // The curvature of a ball brings no more light than a plane, but for edges between facets.
-        let known = if matches!(model, Model::Slab(_)) { None } else { model.radial() };
+        let known = if name.takes("thickness") { None } else { model.radial() };
         let expected = known.map(|radial| of_distance(&scene, radial));
-        let first_order = model.visit(Claim).1;
+        let first_order = model.claims().first_order;
         let lecture = [Estimator::All, Estimator::Notes, Estimator::Thinned];
         let estimators = [Estimator::Cut].into_iter().chain(lecture.into_iter().filter(|_| of == Of::Soft));
         let mut found = Vec::new();

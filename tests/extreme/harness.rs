@@ -205,7 +205,7 @@ pub fn refused(loaded: marmor::Result<Scene>, words: &[&str]) {
 
 /// With every model that exists for the medium of `text`: sound pictures on the preferred backend.
 pub fn sound_in_all_models(text: &str) {
-    for model in ModelName::ALL {
+    for model in ModelName::ALL.iter().copied() {
         let path = Path::new("scene.toml");
         let file = SceneFile::parse(text, path).unwrap().with(&[format!("method.model={}", model.name())]).unwrap();
         // A slab needs a thickness that suits the medium; its own cases have one.

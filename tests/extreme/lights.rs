@@ -106,7 +106,7 @@ fn no_more_light_than_the_brightest_source_ok() {
         .iter()
         .fold(text, |text, (from, to)| text.replacen(from, to, 1));
     let mut found = Vec::new();
-    for name in [ModelName::Standard, ModelName::Better, ModelName::Directional, ModelName::Beam, ModelName::Normalised]
+    for name in [ModelName::STANDARD, ModelName::BETTER, ModelName::DIRECTIONAL, ModelName::BEAM, ModelName::NORMALISED]
     {
         let scene = load(&text.replace("eta = 1.3", &format!("eta = 1.3\nmodel = \"{}\"", name.name()))).unwrap();
         let mean = furnace::by(&scene, Backend::preferred(), Estimator::Cut, true);

@@ -5,7 +5,7 @@ use super::harness::{
     BALL, backends, load, load_with, medium, ok, refused, sound_in_all_models, subsurface_shot, warns,
 };
 use super::sizes::cuboid;
-use marmor::bssrdf::{Bssrdf, Model};
+use marmor::bssrdf::{Bssrdf, Slab};
 use marmor::integrator::{VolumePath, VolumePathOptions};
 use marmor::math::Vec3;
 use marmor::optics::transmittance;
@@ -242,7 +242,7 @@ fn a_slab_of_a_little_more_than_one_mean_free_path_ok() {
     let wax = "sigma_s_prime = 2\nsigma_a = [0.05, 0.1, 0.2]\neta = 1.3\nmodel = \"slab\"\nthickness = 0.6\n";
     let scene = sheet(0.6, wax);
     assert_eq!(scene.warnings, Vec::<String>::new());
-    let Model::Slab(slab) = translucent(&scene).build().unwrap() else { panic!("no slab") };
+    let slab = Slab::new(&translucent(&scene).medium, 0.6, true).unwrap();
     let both = slab.total() + slab.total_transmitted();
     let leaves = f64::from(transmittance(1.3, Vec3::new(0.3, 9.0, 0.7).normalize().y));
     for backend in backends() {

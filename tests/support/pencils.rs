@@ -81,7 +81,7 @@ impl Body {
         let camera = Camera::new([1, 1], DVec3::splat(-1e6), Vec3::NEG_Z, Vec3::Y, 1.0, 1.0).unwrap();
         let translucent = Translucent {
             medium,
-            model: ModelName::Standard,
+            model: ModelName::STANDARD,
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
