@@ -15,14 +15,15 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
-use marmor::cache::{Cache, Density, Envelope, Filler, GatherTally, Gatherer, Scratch, Tuning};
+use marmor::cache::{Cache, Density, Directions, Envelope, Filler, Gatherer, Receiver, Scratch, Tuning};
 use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
-use marmor::math::{Rgb, hash};
+use marmor::math::{DVec3, Rgb, hash};
 use marmor::optics::Medium;
-use marmor::query::{self, Backend, RayQuery, RayTally};
+use marmor::query::{self, Backend, RayQuery};
 use marmor::sampling::{CacheStream, Points};
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile};
+use marmor::scene::{Estimator, Scene, SceneFile, View};
+use marmor::tally::{GatherTally, Tally};
 
 /// Edge of a tile of camera rays, as the renderer has them.
 const TILE: u32 = 32;
@@ -65,26 +66,27 @@ struct Bench<'a> {
     scene: &'a Scene,
     rays: &'a dyn RayQuery,
     lights: &'a Lights,
-    table: &'a AreaTable,
+    /// Of the body's area table.
+    centre: DVec3,
 }
 
 impl Bench<'_> {
-    fn fill(&self, model: &dyn Bssrdf, count: u32) -> Cache {
+    fn body(&self, model: Box<dyn Bssrdf>) -> Receiver {
+        let table = AreaTable::new(&self.scene.objects[0].mesh).unwrap();
+        Receiver { object: 0, table, model, eta: 1.3 }
+    }
+
+    fn fill(&self, body: &Receiver, count: u32) -> Cache {
         let stream = CacheStream::new(Points::Sobol, 1, 0);
         let filler = Filler {
-            scene: self.scene,
-            rays: self.rays,
+            view: View { scene: self.scene, rays: self.rays },
             lights: self.lights,
-            object: 0,
-            model,
-            table: self.table,
-            eta: 1.3,
-            sampling: EntrySampling::Light,
-            cosine_share: 0.0,
+            body,
+            directions: Directions::Lights { cosine_share: 0.0 },
             stream: &stream,
             density: &Density::even(),
         };
-        filler.fill(0, count, &mut RayTally::default())
+        filler.fill(0, count, &mut Tally::default())
     }
 
     /// Hits of some tiles of the picture, tile by tile.
@@ -94,7 +96,7 @@ impl Bench<'_> {
             let ray = camera.ray(pixel, [0.5; 2]);
             let hit = self.rays.closest(&ray).filter(|h| h.mesh == 0)?;
             let p = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.direction);
-            Some(Exit { x: (p.x - self.table.centre()).as_vec3(), n: p.n_geometric, w: -ray.direction })
+            Some(Exit { x: (p.x - self.centre).as_vec3(), n: p.n_geometric, w: -ray.direction })
         };
         let mut tiles = Vec::new();
         for y in (0..camera.resolution[1] / TILE).step_by(3) {
@@ -128,7 +130,8 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
     let thickness = Some(60.0);
     let model = name.build(&medium.1, &ModelOptions { thickness, ..ModelOptions::DEFAULT }).unwrap();
     let envelope = Envelope::new(&*model, &medium.1);
-    let cache = bench.fill(&*model, count);
+    let body = bench.body(model);
+    let (model, cache) = (&*body.model, bench.fill(&body, count));
     let lit = cache.lit.len();
     let start = Instant::now();
     let mut entrants: Vec<Entrant> = Vec::new();
@@ -140,12 +143,12 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         tally: GatherTally::default(),
     };
     for error in [0.003, 0.01, 0.03, 0.1] {
-        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), &*model, Tuning::relative(error));
+        let gatherer = Gatherer::new(Estimator::Cut, copy(&cache), model, Tuning::relative(error));
         entrants.push(entrant(format!("cut {error}"), gatherer));
     }
     let built = start.elapsed().as_secs_f64() / 4.0;
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &*model, Tuning::relative(0.1));
+        let gatherer = Gatherer::new(estimator, copy(&cache), model, Tuning::relative(0.1));
         entrants.push(entrant(estimator.name().to_string(), gatherer));
     }
     let tiles = bench.tiles();
@@ -158,7 +161,7 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         let mut sum = |tile: &Vec<Exit>| {
             let mut out = Vec::new();
             let exits = few(tile);
-            all.gather((&*model, &envelope), &exits, &vec![0; exits.len()], &mut scratch, &mut tally, &mut out);
+            all.gather((model, &envelope), &exits, &vec![0; exits.len()], &mut scratch, &mut tally, &mut out);
             out
         };
         tiles.iter().map(&mut sum).collect()
@@ -177,7 +180,7 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
                     let key = |i: usize| hash(1 + ((round * DRAWS + draw) * 1000 + t as u64) * 10_000 + i as u64);
                     let keys: Vec<u64> = (0..exits.len()).map(key).collect();
                     let start = Instant::now();
-                    e.gatherer.gather((&*model, &envelope), &exits, &keys, &mut scratch, &mut e.tally, &mut out);
+                    e.gatherer.gather((model, &envelope), &exits, &keys, &mut scratch, &mut e.tally, &mut out);
                     seconds += start.elapsed().as_secs_f64();
                     let step = exits.len() / FEW;
                     for (value, exact) in out.iter().step_by(step).zip(exact) {
@@ -224,8 +227,8 @@ fn main() {
     let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
     let rays = query::build(Backend::preferred(), &meshes).unwrap();
     let lights = Lights::new(&scene);
-    let table = AreaTable::new(&scene.objects[0].mesh).unwrap();
-    let bench = Bench { scene: &scene, rays: &*rays, lights: &lights, table: &table };
+    let centre = AreaTable::new(&scene.objects[0].mesh).unwrap().centre();
+    let bench = Bench { scene: &scene, rays: &*rays, lights: &lights, centre };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     pool.install(|| {
         if std::env::var_os("MARMOR_BENCH_TABLE_ONLY").is_none() {
@@ -253,22 +256,24 @@ fn timed(bench: &Bench<'_>) {
     let (_, milk) = medium("skimmilk");
     let model = ModelName::STANDARD.build(&milk, &ModelOptions::DEFAULT).unwrap();
     let envelope = Envelope::new(&*model, &milk);
+    let body = bench.body(model);
+    let model = &*body.model;
     let mut group = criterion.benchmark_group("cache");
     group.throughput(Throughput::Elements(10_000));
-    group.bench_function("fill, samples", |b| b.iter(|| black_box(bench.fill(&*model, 10_000))));
-    let cache = bench.fill(&*model, 10_000);
+    group.bench_function("fill, samples", |b| b.iter(|| black_box(bench.fill(&body, 10_000))));
+    let cache = bench.fill(&body, 10_000);
     let exit = bench.tiles()[0][0];
     let mut out = Vec::new();
     let mut scratch = Scratch::default();
     let mut tally = GatherTally::default();
     group.throughput(Throughput::Elements(cache.lit.len() as u64));
     for estimator in [Estimator::Notes, Estimator::All] {
-        let gatherer = Gatherer::new(estimator, copy(&cache), &*model, Tuning::relative(0.1));
+        let gatherer = Gatherer::new(estimator, copy(&cache), model, Tuning::relative(0.1));
         let mut key = 0;
         group.bench_function(format!("{}, pairs", estimator.name()), |b| {
             b.iter(|| {
                 key += 1;
-                gatherer.gather((&*model, &envelope), &[exit], &[hash(key)], &mut scratch, &mut tally, &mut out);
+                gatherer.gather((model, &envelope), &[exit], &[hash(key)], &mut scratch, &mut tally, &mut out);
                 black_box(out[0])
             });
         });

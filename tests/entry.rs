@@ -2,14 +2,17 @@
 #![allow(clippy::unwrap_used)] // a scene that does not load has failed
 
 use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
-use marmor::cache::{CachedSample, Clock, Density, Envelope, Filler, GatherTally, NearField, Survey, seen};
+use marmor::cache::{
+    CachedSample, Density, Directions, Envelope, Filler, GatherPoint, NearField, Receiver, Survey, seen,
+};
 use marmor::geometry::AreaTable;
 use marmor::light::Lights;
-use marmor::math::{DVec3, Rgb, Vec3};
+use marmor::math::{Rgb, Vec3};
 use marmor::optics::Medium;
-use marmor::query::{self, Backend, RayQuery, RayTally};
+use marmor::query::{self, Backend, RayQuery};
 use marmor::sampling::{CacheStream, PixelStream, Points};
-use marmor::scene::{EntrySampling, Scene, SceneFile, Spread};
+use marmor::scene::{Scene, SceneFile, Spread, View};
+use marmor::tally::Tally;
 
 const MEDIUM: Medium = Medium { sigma_a: Rgb([0.01, 0.05, 0.2]), sigma_s: Rgb([0.5, 0.9, 2.0]), g: 0.0, eta: 1.3 };
 
@@ -29,8 +32,7 @@ struct Set {
     scene: &'static Scene,
     rays: Box<dyn RayQuery>,
     lights: Lights,
-    table: AreaTable,
-    model: Box<dyn Bssrdf>,
+    body: Receiver,
 }
 
 impl Set {
@@ -39,20 +41,20 @@ impl Set {
         let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
         let rays = query::build(Backend::preferred(), &meshes).unwrap();
         let (lights, table) = (Lights::new(scene), AreaTable::new(&scene.objects[0].mesh).unwrap());
-        Self { rays, lights, table, model: name.build(&MEDIUM, &ModelOptions::DEFAULT).unwrap(), scene }
+        let model = name.build(&MEDIUM, &ModelOptions::DEFAULT).unwrap();
+        Self { rays, lights, body: Receiver { object: 0, table, model, eta: MEDIUM.eta }, scene }
+    }
+
+    fn view(&self) -> View<'_> {
+        View { scene: self.scene, rays: &*self.rays }
     }
 
     fn filler<'a>(&'a self, stream: &'a CacheStream, density: &'a Density, cosine_share: f32) -> Filler<'a> {
         Filler {
-            scene: self.scene,
-            rays: &*self.rays,
+            view: self.view(),
             lights: &self.lights,
-            object: 0,
-            table: &self.table,
-            model: &*self.model,
-            eta: MEDIUM.eta,
-            sampling: EntrySampling::Light,
-            cosine_share,
+            body: &self.body,
+            directions: Directions::Lights { cosine_share },
             stream,
             density,
         }
@@ -68,7 +70,7 @@ fn flux(set: &Set, density: &Density, cosine_share: f32) -> [f64; 2] {
     let each: Vec<f64> = (0..caches)
         .map(|seed| {
             let stream = CacheStream::new(Points::Independent, seed, 0);
-            let cache = set.filler(&stream, density, cosine_share).fill(0, FLUX_SAMPLES, &mut RayTally::default());
+            let cache = set.filler(&stream, density, cosine_share).fill(0, FLUX_SAMPLES, &mut Tally::default());
             cache.lit.iter().map(|s| f64::from(s.flux.mean())).sum::<f64>() / f64::from(FLUX_SAMPLES)
         })
         .collect();
@@ -111,9 +113,9 @@ fn a_lamp_nearer_than_it_is_wide_takes_some_directions_by_the_cosine_and_has_les
 #[test]
 fn samples_spread_by_what_is_seen_bring_the_same_flux_as_an_even_spread() {
     let set = Set::new(scene(9.0, ""), ModelName::STANDARD);
-    let envelope = Envelope::new(&*set.model, &MEDIUM);
+    let envelope = Envelope::new(&*set.body.model, &MEDIUM);
     let (even, stream) = (Density::even(), CacheStream::new(Points::Sobol, 99, 0));
-    let points = seen(set.scene, &*set.rays);
+    let points = seen(set.view());
     assert!(points[0].len() > 100 && points[1].len() < points[0].len());
     let survey = Survey::new(&set.filler(&stream, &even, 0.0), &envelope, &points[0], Spread::Seen, 32768);
     assert!(survey.variance > 0.0 && survey.typical.x > 0.0);
@@ -139,28 +141,29 @@ impl Set {
         let hit = self.rays.closest(&query::Ray::new(9.0 * from.as_dvec3(), -from)).unwrap();
         let at = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
         let n = (at.n_geometric + tilt * Vec3::new(0.3, -0.5, 0.8)).normalize();
-        Exit { x: (at.x - self.table.centre()).as_vec3(), n, w: at.n_geometric }
+        Exit { x: (at.x - self.body.table.centre()).as_vec3(), n, w: at.n_geometric }
     }
 
     /// Mean and standard error of the near field at each of `exits`: what their lines find together, and what caches have.
     fn near_field(&self, near: &NearField, exits: &[Exit], runs: u64) -> Vec<[[f64; 2]; 2]> {
         let (even, stream) = (Density::even(), CacheStream::new(Points::Independent, 1, 0));
         let filler = self.filler(&stream, &even, 0.0);
-        let places: Vec<DVec3> = exits.iter().map(|e| self.table.centre() + e.x.as_dvec3()).collect();
         let own = |run: u64| {
-            let streams: Vec<PixelStream> =
-                (0..exits.len() as u64).map(|i| PixelStream::new(5, run * exits.len() as u64 + i, 3)).collect();
-            let mut sums = vec![Rgb::BLACK; exits.len()];
-            let (mut rays, mut gather) = (RayTally::default(), GatherTally::default());
-            let tally = (&mut rays, &mut gather, &mut Clock::default());
-            near.add(&filler, (exits, &places), &streams, tally, &mut sums);
+            let point = |(i, &exit): (u64, &Exit)| {
+                let stream = PixelStream::new(5, run * exits.len() as u64 + i, 3);
+                GatherPoint { exit, place: self.body.table.centre() + exit.x.as_dvec3(), stream }
+            };
+            let points: Vec<GatherPoint> = (0..).zip(exits).map(point).collect();
+            let (mut sums, mut tally) = (vec![Rgb::BLACK; exits.len()], Tally::default());
+            near.add(&filler, &points, &mut tally, &mut sums);
+            let gather = tally.gather;
             assert!(gather.near <= gather.near_points * exits.len() as u64 && gather.non_finite == 0);
             sums
         };
         let own: Vec<Vec<Rgb>> = (0..runs).map(own).collect();
-        let caches: Vec<_> = (0..300).map(|i| filler.fill(i * 2000, 2000, &mut RayTally::default())).collect();
+        let caches: Vec<_> = (0..300).map(|i| filler.fill(i * 2000, 2000, &mut Tally::default())).collect();
         let both = |(i, exit): (usize, &Exit)| {
-            let cached = caches.iter().map(|c| near_part(near, &*self.model, &c.lit, exit) / 2000.0);
+            let cached = caches.iter().map(|c| near_part(near, &*self.body.model, &c.lit, exit) / 2000.0);
             [statistics(own.iter().map(|sums| f64::from(sums[i].mean()))), statistics(cached)]
         };
         exits.iter().enumerate().map(both).collect()
@@ -172,7 +175,7 @@ impl Set {
 fn the_near_field_is_the_part_that_the_cache_leaves_out() {
     for name in [ModelName::STANDARD, ModelName::BEAM, ModelName::DIRECTIONAL] {
         let set = Set::new(scene(9.0, ""), name);
-        let envelope = Envelope::new(&*set.model, &MEDIUM);
+        let envelope = Envelope::new(&*set.body.model, &MEDIUM);
         for (radius, direction) in [(2.0, Vec3::new(0.6, 0.8, 0.0)), (8.0, Vec3::new(0.9, 0.3, 0.3)), (20.0, Vec3::X)] {
             let near = NearField::new(&envelope, radius);
             for [own, cached] in set.near_field(&near, &[set.exit(direction, 0.0)], 16_000) {
@@ -187,7 +190,7 @@ fn the_near_field_is_the_part_that_the_cache_leaves_out() {
 #[test]
 fn exits_that_share_their_lines_have_each_its_own_near_field() {
     let set = Set::new(scene(9.0, ""), ModelName::STANDARD);
-    let envelope = Envelope::new(&*set.model, &MEDIUM);
+    let envelope = Envelope::new(&*set.body.model, &MEDIUM);
     let near = NearField::new(&envelope, 2.0);
     let exits: Vec<Exit> = [0.0, 0.02, 0.1, 0.35, 0.4, 1.2]
         .iter()

@@ -2,10 +2,11 @@
 #![allow(clippy::unwrap_used)] // a test that cannot make its model has failed
 
 use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOptions};
-use marmor::cache::{Cache, CachedSample, Envelope, GatherTally, Gatherer, Scratch, Tuning};
+use marmor::cache::{Cache, CachedSample, Envelope, Gatherer, Scratch, Tuning};
 use marmor::math::{Rgb, Vec3, hash, unit_f32};
 use marmor::optics::Medium;
 use marmor::scene::Estimator;
+use marmor::tally::GatherTally;
 
 const COLOURED: Medium =
     Medium { sigma_a: Rgb([0.032, 0.17, 0.48]), sigma_s: Rgb([0.74, 0.88, 1.01]), g: 0.0, eta: 1.3 };

@@ -5,11 +5,12 @@
 
 use marmor::film::{Film, Window};
 use marmor::geometry::{ObjMesh, write_obj};
-use marmor::integrator::{TOLERATED, View, VolumePath, VolumePathOptions, traceable};
+use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
 use marmor::math::{DVec3, hash, unit_f64};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::scene::{ObstacleKind, Orders, Scene, SceneFile};
+use marmor::tally::TOLERATED;
 use std::sync::atomic::AtomicBool;
 
 /// Numbers of one scene.
@@ -328,7 +329,11 @@ fn no_scene_is_both_accepted_and_wrong() {
             (film, walk) = render(2048);
         }
         (paths, lost) = (paths + walk.walks, lost + walk.losses.total());
-        assert!(walk.losses.total() as f64 <= TOLERATED * walk.walks as f64, "{:?} in {what}", walk.lost(&scene));
+        assert!(
+            walk.losses.total() as f64 <= TOLERATED * walk.walks as f64,
+            "{:?} in {what}",
+            marmor::integrator::lost(&walk, &scene)
+        );
         let pixels: Vec<f64> = film.image().pixels.iter().map(|p| f64::from(p.mean())).collect();
         let mean = pixels.iter().sum::<f64>() / 64.0;
         let error = (pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / 63.0 / 64.0).sqrt();

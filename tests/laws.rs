@@ -5,7 +5,7 @@
 use marmor::bssrdf::{ModelName, SingleScattering};
 use marmor::film::{Counts, Film, Image, Window};
 use marmor::integrator::{
-    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions,
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
 };
 use marmor::math::Rgb;
 use marmor::optics::{reflectance, transmittance};
@@ -13,6 +13,7 @@ use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
 use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread, Surface};
+use marmor::tally::Tally;
 use std::fmt::Write as _;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;

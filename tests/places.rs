@@ -4,12 +4,13 @@
 
 use marmor::film::{Film, Window};
 use marmor::geometry::Precision;
-use marmor::integrator::{View, VolumePath, VolumePathOptions, WalkTally};
+use marmor::integrator::{View, VolumePath, VolumePathOptions};
 use marmor::light::Lights;
 use marmor::math::{Rgb, Vec3, hash, unit_f32};
 use marmor::query::{self, Backend, Ray};
 use marmor::render::{self, Job};
 use marmor::scene::{Orders, Scene, SceneFile};
+use marmor::tally::WalkTally;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 

@@ -5,13 +5,14 @@
 mod support;
 
 use marmor::film::{Film, Image, Window};
-use marmor::integrator::{Left, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions, WalkTally};
+use marmor::integrator::{Left, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::reflectance;
 use marmor::query::{self, Backend, RayQuery};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
 use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
+use marmor::tally::{Tally, WalkTally};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use support::{Row, table, whole_table};

@@ -1,8 +1,9 @@
 //! The sum over a tree of samples, in which one random member stands for each far node.
 
-use super::{Columns, Envelope, GatherTally, Node, Tree, Tuning};
+use super::{Columns, Envelope, Node, Tree, Tuning};
 use crate::bssrdf::{Bssrdf, Exit, Layout};
 use crate::math::{Vec3, Vec4, hash};
+use crate::tally::GatherTally;
 
 /// A node whose members spread over less than this share of its distance counts as a point when the sum is guessed.
 const GUESS: f32 = 0.3;

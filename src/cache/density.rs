@@ -2,10 +2,8 @@
 //! Any density gives the same mean; each sample is weighted by its inverse.
 
 use super::{CachedSample, Envelope, Filler};
-use crate::geometry::SurfacePoint;
 use crate::math::{DVec3, Vec3, Vec4};
-use crate::query::RayQuery;
-use crate::scene::{Scene, Spread};
+use crate::scene::{Spread, View};
 
 /// Trial samples for each bin of equal area along the area table.
 const PILOTS_PER_BIN: u32 = 32;
@@ -102,7 +100,7 @@ impl Survey {
         let bins = (count / PASS_PER_PILOT / PILOTS_PER_BIN).clamp(8, BINS);
         let attempted = bins * PILOTS_PER_BIN;
         let pilots = filler.pilots(attempted);
-        let local = |s: &Seen| ((s.x - filler.table.centre()).as_vec3(), s.spread2);
+        let local = |s: &Seen| ((s.x - filler.body.table.centre()).as_vec3(), s.spread2);
         let seen: Vec<(Vec3, f32)> = seen.iter().map(local).collect();
         let sums: Vec<Vec4> = seen.iter().map(|s| pilots.iter().map(|(_, p)| share(envelope, s, p)).sum()).collect();
         let mean = sums.iter().sum::<Vec4>() / sums.len().max(1) as f32;
@@ -156,8 +154,9 @@ fn inverse(v: Vec4) -> Vec4 {
     Vec4::from_array(v.to_array().map(|v| if v > f32::MIN_POSITIVE { 1.0 / v } else { 0.0 }))
 }
 
-/// For each object of `scene`, points that the camera sees of it. A function of the scene alone.
-pub fn seen(scene: &Scene, rays: &dyn RayQuery) -> Vec<Vec<Seen>> {
+/// For each object, points that the camera sees of it. A function of the scene alone.
+pub fn seen(view: View<'_>) -> Vec<Vec<Seen>> {
+    let View { scene, rays } = view;
     let camera = &scene.camera;
     let [columns, rows] = camera.resolution.map(|r| r.min(CELLS));
     let [width, height] = [(0, columns), (1, rows)].map(|(a, cells)| camera.resolution[a] as f32 / cells as f32);
@@ -170,7 +169,7 @@ pub fn seen(scene: &Scene, rays: &dyn RayQuery) -> Vec<Vec<Seen>> {
         let (x, y) = ((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5);
         let ray = through(x, y);
         let Some(hit) = rays.closest(&ray) else { continue };
-        let at: SurfacePoint = scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
+        let at = view.outwards(&hit);
         let [right, down] = [through(x + 0.5, y), through(x, y + 0.5)].map(|r| 2.0 * (r.direction - ray.direction));
         let distance2 = at.x.distance_squared(camera.origin) as f32;
         let cos = at.n_geometric.dot(ray.direction).abs().max(0.05);

@@ -1,9 +1,10 @@
 //! The estimators by name: what each prepares once a pass, and the sum at an exit.
 
-use super::{Cache, Columns, Cut, Envelope, GatherTally, Scratch, Thinning, notes, thinned};
+use super::{Cache, Columns, Cut, Envelope, Scratch, Thinning, notes, thinned};
 use crate::bssrdf::{Bssrdf, Exit, Partition};
 use crate::math::{Rgb, Vec4};
 use crate::scene::Estimator;
+use crate::tally::GatherTally;
 
 /// Below this many samples `cut` is the plain vectorised sum, which is then faster than any tree.
 pub const PLAIN_SUM: usize = 1024;

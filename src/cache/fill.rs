@@ -6,32 +6,47 @@ use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Arrival, Lights, emitted};
 use crate::math::Rgb;
 use crate::optics::{refract, transmittance};
-use crate::query::{Ray, RayQuery, RayTally};
+use crate::query::Ray;
 use crate::sampling::CacheStream;
-use crate::scene::{EntrySampling, Scene};
+use crate::scene::View;
+use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// What the filling of one object's cache needs, pass after pass.
-pub struct Filler<'a> {
-    /// The scene.
-    pub scene: &'a Scene,
-    /// Its ray backend.
-    pub rays: &'a dyn RayQuery,
-    /// Its lights.
-    pub lights: &'a Lights,
-    /// The translucent object.
+/// A translucent object as light enters it.
+pub struct Receiver {
+    /// Its number.
     pub object: u32,
     /// Its area table; cached points are relative to its centre.
-    pub table: &'a AreaTable,
+    pub table: AreaTable,
     /// Its BSSRDF, which says at what depth a sample stands.
-    pub model: &'a dyn Bssrdf,
+    pub model: Box<dyn Bssrdf>,
     /// Its relative index of refraction.
     pub eta: f32,
+}
+
+/// How directions of entering light are picked.
+#[derive(Clone, Copy, Debug)]
+pub enum Directions {
+    /// Towards the lights, but for this share by the cosine; see [`Lights::cosine_share`].
+    Lights {
+        /// In [0, 1].
+        cosine_share: f32,
+    },
+    /// By the cosine, the lecture's way.
+    Cosine,
+}
+
+/// What fills the cache of one object, pass after pass.
+pub struct Filler<'a> {
+    /// The scene and its rays.
+    pub view: View<'a>,
+    /// Its lights.
+    pub lights: &'a Lights,
+    /// The object.
+    pub body: &'a Receiver,
     /// How directions are picked.
-    pub sampling: EntrySampling,
-    /// Share of the directions picked by the cosine where lights are sampled; see [`Lights::cosine_share`].
-    pub cosine_share: f32,
+    pub directions: Directions,
     /// The object's long stream of points.
     pub stream: &'a CacheStream,
     /// How the points are spread over the surface.
@@ -52,24 +67,24 @@ const CHUNK: u64 = 256;
 impl Filler<'_> {
     /// The samples with numbers `first`..`first + count`, in parallel. Which thread fills which sample does not
     /// matter: a sample is a function of its number.
-    pub fn fill(&self, first: u64, count: u32, rays: &mut RayTally) -> Cache {
-        let chunks: Vec<(Vec<CachedSample>, RayTally)> = (0..u64::from(count).div_ceil(CHUNK))
+    pub fn fill(&self, first: u64, count: u32, tally: &mut Tally) -> Cache {
+        let chunks: Vec<(Vec<CachedSample>, Tally)> = (0..u64::from(count).div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let start = chunk * CHUNK;
                 let end = (start + CHUNK).min(u64::from(count));
-                let mut tally = RayTally::default();
-                let lit = match self.sampling {
-                    EntrySampling::Light => self.by_light(first + start..first + end, &mut tally),
-                    EntrySampling::Cosine => self.by_cosine(first + start..first + end, &mut tally),
+                let mut tally = Tally::default();
+                let lit = match self.directions {
+                    Directions::Lights { .. } => self.by_light(first + start..first + end, &mut tally),
+                    Directions::Cosine => self.by_cosine(first + start..first + end, &mut tally),
                 };
                 (lit, tally)
             })
             .collect();
         let mut lit = Vec::with_capacity(chunks.iter().map(|(samples, _)| samples.len()).sum());
-        for (samples, tally) in chunks {
+        for (samples, work) in chunks {
             lit.extend(samples);
-            *rays += tally;
+            *tally += work;
         }
         Cache { lit, attempted: count }
     }
@@ -79,15 +94,15 @@ impl Filler<'_> {
         let lit = |number: u64| {
             let (at, weight, u) = self.point(number);
             let place = self.density.place(self.stream.numbers(number).0).0;
-            let (sample, shadow) = self.entering(at, weight, u, &mut RayTally::default())?;
-            let hidden = shadow.is_some_and(|shadow| self.rays.occluded(&shadow.ray));
+            let (sample, shadow) = self.entering(at, weight, u, &mut Tally::default())?;
+            let hidden = shadow.is_some_and(|shadow| self.view.rays.occluded(&shadow.ray));
             (sample.is_finite() && !hidden).then_some((place, sample))
         };
         (0..u64::from(count)).into_par_iter().filter_map(lit).collect()
     }
 
     /// Candidates first, then all their shadow rays at once.
-    fn by_light(&self, numbers: std::ops::Range<u64>, tally: &mut RayTally) -> Vec<CachedSample> {
+    fn by_light(&self, numbers: std::ops::Range<u64>, tally: &mut Tally) -> Vec<CachedSample> {
         let mut candidates = Vec::with_capacity(CHUNK as usize);
         for number in numbers {
             let (at, weight, u) = self.point(number);
@@ -95,14 +110,14 @@ impl Filler<'_> {
         }
         let shadows: Vec<Ray> = candidates.iter().filter_map(|(_, shadow)| Some(shadow.as_ref()?.ray)).collect();
         let mut occluded = vec![false; shadows.len()];
-        self.rays.occluded_batch(&shadows, &mut occluded);
-        tally.shadow += shadows.len() as u64;
+        self.view.rays.occluded_batch(&shadows, &mut occluded);
+        tally.rays.shadow += shadows.len() as u64;
         let mut occluded = occluded.into_iter();
         candidates.retain(|(_, shadow)| {
             let Some(shadow) = shadow else { return true };
             let open = occluded.next() == Some(false);
             if let Some(light) = shadow.light {
-                tally.lights.ask(light, open);
+                tally.rays.lights.ask(light, open);
             }
             open
         });
@@ -115,7 +130,7 @@ impl Filler<'_> {
         at: SurfacePoint,
         weight: f32,
         u: [f32; 5],
-        tally: &mut RayTally,
+        tally: &mut Tally,
     ) -> Option<(CachedSample, Option<Shadow>)> {
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         let at = SurfacePoint { n: at.n_geometric, ..at };
@@ -123,15 +138,22 @@ impl Filler<'_> {
         let sample = self.transmitted(&at, weight, &arrival, u[4])?;
         let shadow = Shadow { ray: arrival.shadow, light: arrival.light };
         if let (true, Some(light)) = (open, arrival.light) {
-            tally.lights.meet(light);
+            tally.rays.lights.meet(light);
         }
         Some((sample, (!open).then_some(shadow)))
     }
 
+    fn cosine_share(&self) -> f32 {
+        match self.directions {
+            Directions::Lights { cosine_share } => cosine_share,
+            Directions::Cosine => 1.0,
+        }
+    }
+
     /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
     /// and some by the cosine or the environment, each counts over the density of both [Vea97], the balance heuristic.
-    fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut RayTally) -> Option<(Arrival, bool)> {
-        let share = self.cosine_share;
+    fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut Tally) -> Option<(Arrival, bool)> {
+        let share = self.cosine_share();
         if !self.lights.has_emitters() {
             return if self.lights.has_environment() {
                 Some((self.lights.sample_environment(at, [u[1], u[2]])?, false))
@@ -140,17 +162,17 @@ impl Filler<'_> {
             };
         }
         if u[3] >= share {
-            let mut arrival = self.lights.sample_emitter(self.scene, at, [u[0], u[1], u[2]])?;
+            let mut arrival = self.lights.sample_emitter(self.view.scene, at, [u[0], u[1], u[2]])?;
             arrival.irradiance *=
                 1.0 / ((1.0 - share) + share * self.lights.pdf_around(at, arrival.w) / arrival.pdf_angle);
             return Some((arrival, false));
         }
         let (w, ray) = self.lights.look_around(at, [u[1], u[2]])?;
-        tally.bounce += 1;
-        let (radiance, by_light, light) = match self.rays.closest(&ray) {
+        tally.rays.bounce += 1;
+        let (radiance, by_light, light) = match self.view.rays.closest(&ray) {
             Some(hit) => {
-                let (pdf, light) = (self.lights.pdf_angle(self.scene, &hit, w), self.lights.number(hit.mesh));
-                (emitted(self.scene, &hit, w), pdf, light)
+                let (pdf, light) = (self.lights.pdf_angle(self.view.scene, &hit, w), self.lights.number(hit.mesh));
+                (emitted(self.view.scene, &hit, w), pdf, light)
             }
             None => (self.lights.environment(w), 0.0, self.lights.number_of_sun(w)),
         };
@@ -160,19 +182,19 @@ impl Filler<'_> {
     }
 
     /// Cosine-sampled directions, followed to whatever shines there.
-    fn by_cosine(&self, numbers: std::ops::Range<u64>, tally: &mut RayTally) -> Vec<CachedSample> {
+    fn by_cosine(&self, numbers: std::ops::Range<u64>, tally: &mut Tally) -> Vec<CachedSample> {
         let mut lit = Vec::new();
         for number in numbers {
             let (at, weight, u) = self.point(number);
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { continue };
-            tally.bounce += 1;
-            let (radiance, light) = match self.rays.closest(&ray) {
-                Some(hit) => (emitted(self.scene, &hit, w), self.lights.number(hit.mesh)),
+            tally.rays.bounce += 1;
+            let (radiance, light) = match self.view.rays.closest(&ray) {
+                Some(hit) => (emitted(self.view.scene, &hit, w), self.lights.number(hit.mesh)),
                 None => (self.lights.environment(w), self.lights.number_of_sun(w)),
             };
             if !radiance.is_black() {
                 if let Some(light) = light {
-                    tally.lights.meet(light);
+                    tally.rays.lights.meet(light);
                 }
                 lit.extend(self.transmitted(
                     &at,
@@ -190,21 +212,21 @@ impl Filler<'_> {
     fn point(&self, number: u64) -> (SurfacePoint, f32, [f32; 5]) {
         let (pick, u) = self.stream.numbers(number);
         let (pick, weight) = self.density.place(pick);
-        let at = self.table.sample(pick, [u[0], u[1]]);
-        let mut point = self.scene.objects[self.object as usize].mesh.point(at.triangle, at.u, at.v);
+        let at = self.body.table.sample(pick, [u[0], u[1]]);
+        let mut point = self.view.scene.objects[self.body.object as usize].mesh.point(at.triangle, at.u, at.v);
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         point.n = point.n_geometric;
-        (point, weight * self.table.area() as f32, [u[2], u[3], u[4], u[5], u[6]])
+        (point, weight * self.body.table.area() as f32, [u[2], u[3], u[4], u[5], u[6]])
     }
 
     /// Refracts an arrival into the medium; `weight` is one over the density of the point [unit²]. `None` where it is totally reflected.
     fn transmitted(&self, at: &SurfacePoint, weight: f32, arrival: &Arrival, u: f32) -> Option<CachedSample> {
-        let w = refract(arrival.w, at.n, self.eta)?;
-        let t12 = transmittance(self.eta, arrival.w.dot(at.n));
+        let w = refract(arrival.w, at.n, self.body.eta)?;
+        let t12 = transmittance(self.body.eta, arrival.w.dot(at.n));
         let flux: Rgb = arrival.irradiance * (t12 * weight);
         (!flux.is_black()).then(|| CachedSample {
-            entry: Entry { x: (at.x - self.table.centre()).as_vec3(), n: at.n, w },
-            depth: self.model.sample_depth(u),
+            entry: Entry { x: (at.x - self.body.table.centre()).as_vec3(), n: at.n, w },
+            depth: self.body.model.sample_depth(u),
             flux,
         })
     }

@@ -1,11 +1,12 @@
 //! Light that enters close to an exit, sampled anew for each exit: for media whose light does not come as far as the next
 //! sample of a cache.
 
-use super::{CachedSample, Clock, Columns, Envelope, Filler, GatherTally, Shadow};
+use super::{CachedSample, Columns, Envelope, Filler, Shadow};
 use crate::bssrdf::{Exit, Layout, Partition};
 use crate::math::{DVec3, Frame, Rgb, Vec3};
-use crate::query::{Hit, Ray, RayTally};
+use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
+use crate::tally::{Clock, Tally};
 use std::f32::consts::TAU;
 use std::time::Instant;
 
@@ -54,6 +55,17 @@ pub struct NearField {
     cumulative: Vec<f32>,
     /// Chance per area in each ring [1/unit²].
     per_area: Vec<f32>,
+}
+
+/// A point where light is gathered.
+#[derive(Clone, Copy, Debug)]
+pub struct GatherPoint {
+    /// How light comes out, relative to the centre of the object's area table.
+    pub exit: Exit,
+    /// The same point in the scene.
+    pub place: DVec3,
+    /// Numbers of the point's own.
+    pub stream: PixelStream,
 }
 
 /// A line to look for surfaces along.
@@ -127,52 +139,44 @@ impl NearField {
         self.radius
     }
 
-    /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `exits` to `sums`; `places` are the points of the
-    /// exits in the scene, and `streams`, one for each, have its numbers. All surfaces found along lines parallel to the
-    /// normals and tangents of neighbouring exits count for each of them, over the density of all their lines together.
-    pub fn add(
-        &self,
-        filler: &Filler<'_>,
-        (exits, places): (&[Exit], &[DVec3]),
-        streams: &[PixelStream],
-        (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
-        sums: &mut [Rgb],
-    ) {
-        let (start, before) = (Instant::now(), clock.rays);
-        let [mut all, mut own] = [0; 2].map(|_| Columns::new(filler.model.layout()));
+    /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `points` to `sums`. All surfaces found along lines parallel
+    /// to the normals and tangents of neighbouring exits count for each of them, over the density of all their lines together.
+    pub fn add(&self, filler: &Filler<'_>, points: &[GatherPoint], tally: &mut Tally, sums: &mut [Rgb]) {
+        let (start, before) = (Instant::now(), tally.clock.rays);
+        let model = &*filler.body.model;
+        let [mut all, mut own] = [0; 2].map(|_| Columns::new(model.layout()));
         let mut picked = Vec::new();
-        let groups = exits.chunks(GROUP).zip(places.chunks(GROUP));
-        for (((exits, places), streams), sums) in groups.zip(streams.chunks(GROUP)).zip(sums.chunks_mut(GROUP)) {
-            let middle = |(exit, &x): (&Exit, &DVec3)| {
-                let frame = Frame::about(exit.n);
-                Middle { x, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
+        for (points, sums) in points.chunks(GROUP).zip(sums.chunks_mut(GROUP)) {
+            let middle = |point: &GatherPoint| {
+                let frame = Frame::about(point.exit.n);
+                Middle { x: point.place, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
             };
-            let middles: Vec<Middle> = exits.iter().zip(places).map(middle).collect();
-            let candidates = self.along(filler, self.lines(&middles, streams), (&mut *rays, &mut *clock));
-            let found = self.lit(filler, &middles, candidates, (&mut *rays, &mut *gather, &mut *clock));
-            gather.near_points += found.len() as u64;
-            all.refill(filler.model, found.iter().map(|f| &f.sample));
-            for ((exit, &place), sum) in exits.iter().zip(places).zip(sums) {
-                let exit = Exit { x: Vec3::ZERO, ..*exit };
+            let middles: Vec<Middle> = points.iter().map(middle).collect();
+            let candidates = self.along(filler, self.lines(&middles, points), tally);
+            let found = self.lit(filler, &middles, candidates, tally);
+            tally.gather.near_points += found.len() as u64;
+            all.refill(model, found.iter().map(|f| &f.sample));
+            for (point, sum) in points.iter().zip(sums) {
+                let exit = Exit { x: Vec3::ZERO, ..point.exit };
                 picked.clear();
-                picked.extend((0_u32..).zip(&found).map(|(i, f)| (i, (f.place - place).as_vec3())));
+                picked.extend((0_u32..).zip(&found).map(|(i, f)| (i, (f.place - point.place).as_vec3())));
                 // Beyond the radius the share is 0.
                 picked.retain(|(_, way)| way.length_squared() < self.radius * self.radius);
-                gather.near += picked.len() as u64;
+                tally.gather.near += picked.len() as u64;
                 own.pick_moved(&all, &picked);
                 let mut value = [[0.0; 3]];
-                gather.clamped += own.sum(filler.model, &[exit], self.partition, &mut value);
+                tally.gather.clamped += own.sum(model, &[exit], self.partition, &mut value);
                 *sum += Rgb::from_fn(|c| value[0][c] as f32);
             }
         }
-        clock.near += start.elapsed().as_secs_f64() - (clock.rays - before);
+        tally.clock.near += start.elapsed().as_secs_f64() - (tally.clock.rays - before);
     }
 
     /// The lines about some exits.
-    fn lines(&self, middles: &[Middle], streams: &[PixelStream]) -> Vec<Line> {
+    fn lines(&self, middles: &[Middle], points: &[GatherPoint]) -> Vec<Line> {
         let mut lines = Vec::with_capacity(middles.len() * (LINES as usize + 1));
-        for (middle, stream) in middles.iter().zip(streams) {
-            let [along, across] = PURPOSES.map(|purpose| stream.aside(purpose));
+        for (middle, point) in middles.iter().zip(points) {
+            let [along, across] = PURPOSES.map(|purpose| point.stream.aside(purpose));
             lines.extend((0..LINES).filter_map(|line| self.line(middle, 0, along.split(line, LINES))));
             let mut choice = across;
             let u = choice.next_1d();
@@ -198,12 +202,8 @@ impl NearField {
     }
 
     /// What enters where the lines meet the object, all of them at once, surface after surface.
-    fn along(
-        &self,
-        filler: &Filler<'_>,
-        mut lines: Vec<Line>,
-        (rays, clock): (&mut RayTally, &mut Clock),
-    ) -> Vec<Candidate> {
+    fn along(&self, filler: &Filler<'_>, mut lines: Vec<Line>, tally: &mut Tally) -> Vec<Candidate> {
+        let view = filler.view;
         let mut candidates = Vec::with_capacity(lines.len());
         let mut surface = 0;
         let (mut asked, mut hits): (Vec<Ray>, Vec<Option<Hit>>) = (Vec::new(), Vec::new());
@@ -212,29 +212,29 @@ impl NearField {
             asked.extend(lines.iter().map(|line| line.ray));
             hits.clear();
             hits.resize(lines.len(), None);
-            Clock::time(&mut clock.rays, || filler.rays.closest_batch(&asked, &mut hits));
-            rays.bounce += lines.len() as u64;
+            Clock::time(&mut tally.clock.rays, || filler.view.rays.closest_batch(&asked, &mut hits));
+            tally.rays.bounce += lines.len() as u64;
             let mut hit = hits.iter();
             lines.retain_mut(|line| {
                 let Some(Some(hit)) = hit.next() else { return false };
                 // The next one may begin where this one is hit, but for rounding.
                 line.ray.t_min = hit.t.max(line.ray.t_min.next_up());
                 let again = line.last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
-                let mesh = &filler.scene.objects[hit.mesh as usize].mesh;
+                let mesh = &view.scene.objects[hit.mesh as usize].mesh;
                 let crossing = || mesh.crossing(hit.triangle, line.through, line.ray.direction.as_dvec3());
                 let square = f64::from(self.radius) * f64::from(self.radius);
                 let near = |place: &DVec3| place.distance_squared(line.middle) <= square;
                 if !again
-                    && hit.mesh == filler.object
+                    && hit.mesh == filler.body.object
                     && let Some(place) = crossing().filter(near)
                 {
-                    let at = mesh.point(hit.triangle, hit.u, hit.v);
+                    let at = view.outwards(hit);
                     surface += 1;
                     for part in 0..LIGHTS {
                         let mut numbers = line.numbers.split(part, LIGHTS);
                         let ([u, v, pick, share], depth) = (numbers.next_4d(), numbers.next_1d());
                         // The lights have the first two numbers, which are spread best: their noise is the largest.
-                        let entering = filler.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], rays);
+                        let entering = filler.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], tally);
                         candidates.extend(entering.map(|(mut sample, shadow)| {
                             sample.entry.x = Vec3::ZERO;
                             Candidate { surface, n_geometric: at.n_geometric, place, sample, shadow }
@@ -257,22 +257,22 @@ impl NearField {
         filler: &Filler<'_>,
         middles: &[Middle],
         candidates: Vec<Candidate>,
-        (rays, gather, clock): (&mut RayTally, &mut GatherTally, &mut Clock),
+        tally: &mut Tally,
     ) -> Vec<Found> {
         let shadows: Vec<Ray> = candidates.iter().filter_map(|c| Some(c.shadow.as_ref()?.ray)).collect();
         let mut hidden = vec![false; shadows.len()];
-        Clock::time(&mut clock.rays, || filler.rays.occluded_batch(&shadows, &mut hidden));
-        rays.shadow += shadows.len() as u64;
+        Clock::time(&mut tally.clock.rays, || filler.view.rays.occluded_batch(&shadows, &mut hidden));
+        tally.rays.shadow += shadows.len() as u64;
         let mut hidden = hidden.into_iter();
         let mut found: Vec<Found> = Vec::with_capacity(candidates.len());
         let (mut last, mut density) = (0, 0.0);
         // Where the distance alone decides, all light at one point is one sample.
-        let joined = filler.model.layout() == Layout::POINTS;
+        let joined = filler.body.model.layout() == Layout::POINTS;
         for Candidate { surface, n_geometric, place, mut sample, shadow } in candidates {
             if let Some(shadow) = shadow {
                 let open = hidden.next() == Some(false);
                 if let Some(light) = shadow.light {
-                    rays.lights.ask(light, open);
+                    tally.rays.lights.ask(light, open);
                 }
                 if !open {
                     continue;
@@ -288,7 +288,7 @@ impl NearField {
             }
             sample.flux *= 1.0 / density;
             match found.last_mut().filter(|_| again && joined) {
-                _ if !sample.is_finite() => (gather.non_finite, last) = (gather.non_finite + 1, 0),
+                _ if !sample.is_finite() => (tally.gather.non_finite, last) = (tally.gather.non_finite + 1, 0),
                 Some(same) => same.sample.flux += sample.flux,
                 None => found.push(Found { place, sample }),
             }

@@ -1,8 +1,9 @@
 //! The lecture's estimator.
 
-use super::{Cache, GatherTally};
+use super::Cache;
 use crate::bssrdf::{Bssrdf, Exit};
 use crate::math::{Rgb, hash};
+use crate::tally::GatherTally;
 
 /// (1/M) Σ S_d L_t over all cached samples, each kept with probability exp(-σ_tr d) and then weighted by its inverse
 /// [Frisvad, "Subsurface Scattering", rejection control]. σ_tr is the smallest of the three channels': with

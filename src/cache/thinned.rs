@@ -1,8 +1,9 @@
 //! The lecture's estimator without looking at every sample.
 
-use super::{Cache, CachedSample, Columns, GatherTally, Tree};
+use super::{Cache, CachedSample, Columns, Tree};
 use crate::bssrdf::{Bssrdf, Exit};
 use crate::math::{Rgb, hash};
+use crate::tally::GatherTally;
 
 /// Nodes are opened where that spares more trials than this.
 const SPARED: f32 = 8.0;

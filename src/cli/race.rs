@@ -8,10 +8,11 @@ use super::{stdout, threads};
 use marmor::film::{
     Checkpoint, Film, Format, Image, SelfError, Truth, Window, check_replaceable, judge, write_atomically,
 };
-use marmor::integrator::{Tally, View};
+use marmor::integrator::{View, lost};
 use marmor::query::{self, RayQuery};
 use marmor::render::{Job, Seconds};
 use marmor::report::ErrorPoint;
+use marmor::tally::Tally;
 use marmor::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -248,7 +249,7 @@ impl<'a> Runner<'a> {
     /// What there is to say of lost paths, if they are more than rounding explains; for the page and for the log.
     fn lost(&self) -> Vec<String> {
         let name = &self.entrant.name;
-        let said = self.tally.walk.lost(&self.entrant.prepared.scene);
+        let said = lost(&self.tally.walk, &self.entrant.prepared.scene);
         if self.tally.walk.lost_many() { said.iter().map(|s| format!("{name}: {s}.")).collect() } else { Vec::new() }
     }
 

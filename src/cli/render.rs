@@ -11,7 +11,7 @@ use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
 use super::{read_picture, replay, threads};
 use marmor::film::{Film, Format, Image, Window, check_replaceable, check_writable};
-use marmor::integrator::{Integrator, Part, View};
+use marmor::integrator::{Integrator, Part, View, lost};
 use marmor::query;
 use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
 use marmor::report::RecordFile;
@@ -200,8 +200,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
         }
         if args.strict && spent.tally.walk.lost_many() {
             failed.iter().for_each(|error| eprintln!("marmor: {error}"));
-            let lost = spent.tally.walk.lost(scene).join("; ");
-            return Err(Error::new(ErrorKind::Numeric, format!("--strict: {lost}")));
+            let why = lost(&spent.tally.walk, scene).join("; ");
+            return Err(Error::new(ErrorKind::Numeric, format!("--strict: {why}")));
         }
         // The pictures are there, and something else that was asked for is not.
         failed.map_or(Ok(ExitCode::SUCCESS), Err)
@@ -364,7 +364,7 @@ impl Task<'_> {
             );
         }
         let level = if outcome.tally.walk.lost_many() { "warning: " } else { "" };
-        for sentence in outcome.tally.walk.lost(scene) {
+        for sentence in lost(&outcome.tally.walk, scene) {
             eprintln!("{level}{sentence}");
         }
         let names: Vec<String> = outputs.iter().map(|p| p.display().to_string()).collect();

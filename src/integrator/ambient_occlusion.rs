@@ -1,10 +1,11 @@
 //! The share of the cosine-weighted hemisphere that is open.
 
-use super::{CameraRay, Integrator, Part, Tally, View};
+use super::{CameraRay, Integrator, Part, View, camera_hits};
 use crate::math::{Frame, Rgb};
 use crate::query::Ray;
 use crate::sampling::Pairs;
 use crate::scene::Scene;
+use crate::tally::Tally;
 
 /// Occlusion rays that go to the backend together, unless one camera ray has more: some MB a thread.
 const MOST_PROBES: usize = 1 << 16;
@@ -23,7 +24,7 @@ impl Integrator for AmbientOcclusion {
     fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
 
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        let hits = view.camera_hits(rays, tally);
+        let hits = camera_hits(view, rays, tally);
 
         let per_hit = self.rays as usize;
         let together = (MOST_PROBES / per_hit).max(1);

@@ -1,11 +1,12 @@
 //! Direct light on opaque surfaces: soft shadows of area lights.
 
 use super::shade::DirectLight;
-use super::{CameraRay, Integrator, KnownLights, Part, Tally, View};
+use super::{CameraRay, Integrator, KnownLights, Part, View, camera_hits};
 use crate::error::Result;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::scene::{Scene, Surface};
+use crate::tally::Tally;
 
 /// Lambertian surfaces under the scene's lights, without interreflection. A translucent surface is shown as
 /// a Lambertian one with its model's diffuse reflectance: a preview.
@@ -44,7 +45,7 @@ impl Integrator for Direct {
     fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
 
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        let hits = view.camera_hits(rays, tally);
+        let hits = camera_hits(view, rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(ray.ray.direction),

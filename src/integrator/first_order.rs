@@ -1,10 +1,11 @@
 //! The part of a `subsurface` picture that is light scattered once, alone.
 
 use super::single::Single;
-use super::{CameraRay, Integrator, Part, Tally, View};
+use super::{CameraRay, Integrator, Part, View, camera_hits};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::scene::Scene;
+use crate::tally::Tally;
 
 /// What `single` adds to the picture of [`super::Subsurface`]: the same samples by the same numbers, and nothing else.
 pub struct FirstOrder(Option<Single>);
@@ -26,7 +27,7 @@ impl Integrator for FirstOrder {
 
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let Some(single) = &self.0 else { return };
-        let hits = view.camera_hits(rays, tally);
+        let hits = camera_hits(view, rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = hit.as_ref().map_or(Rgb::BLACK, |hit| single.radiance(view, ray, hit, tally));
         }

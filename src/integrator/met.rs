@@ -2,8 +2,8 @@
 
 use super::Tally;
 use crate::light::{CountedLight, Lights};
-use crate::query::LIGHTS;
 use crate::scene::{Scene, Surface};
+use crate::tally::LIGHTS;
 
 /// Times that a light must have come before the render can tell its own error: some tens, for the spread of fewer is
 /// not known.

@@ -5,55 +5,32 @@ mod ambient_occlusion;
 mod direct;
 mod first_order;
 mod local;
-mod losses;
+mod lost;
 mod met;
+mod parts;
 mod shade;
 mod single;
 mod subsurface;
 mod trust;
 mod volume_path;
 
-use crate::cache::{Clock, GatherTally};
-use crate::geometry::SurfacePoint;
-use crate::math::{Rgb, Vec3};
-use crate::query::{Hit, Ray, RayQuery, RayTally};
+pub use crate::cache::SubsurfaceOptions;
+use crate::math::Rgb;
+use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
+pub use crate::scene::View;
 use crate::scene::{Obstacle, Scene};
+use crate::tally::{Clock, Tally};
 pub use ambient_occlusion::AmbientOcclusion;
 pub use direct::Direct;
 pub use first_order::FirstOrder;
 pub use local::{Candidate, Local, LocalShape};
-pub use losses::{Cause, Loss, Losses, TOLERATED};
+pub use lost::lost;
 pub use met::KnownLights;
-pub use subsurface::{Subsurface, SubsurfaceOptions};
+pub use parts::Part;
+pub use subsurface::Subsurface;
 pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness, Verdict};
 pub use volume_path::{Left, VolumePath, VolumePathOptions};
-
-/// The scene and the backend that was built for it.
-#[derive(Clone, Copy)]
-pub struct View<'a> {
-    /// The checked world.
-    pub scene: &'a Scene,
-    /// Rays against its meshes.
-    pub rays: &'a dyn RayQuery,
-}
-
-impl View<'_> {
-    /// The nearest hit of each camera ray.
-    fn camera_hits(&self, rays: &[CameraRay], tally: &mut Tally) -> Vec<Option<Hit>> {
-        let rays: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
-        let mut hits = vec![None; rays.len()];
-        Clock::time(&mut tally.clock.rays, || self.rays.closest_batch(&rays, &mut hits));
-        tally.rays.camera += rays.len() as u64;
-        hits
-    }
-
-    /// The point of `hit`, its normals towards where a ray into `direction` came from.
-    #[inline]
-    fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
-        self.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v).facing(-direction)
-    }
-}
 
 /// One sample of one pixel.
 #[derive(Clone, Copy, Debug)]
@@ -64,112 +41,19 @@ pub struct CameraRay {
     pub stream: PixelStream,
 }
 
-/// What the work cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default)]
-pub struct Tally {
-    /// Rays by kind.
-    pub rays: RayTally,
-    /// Cached samples and pairs.
-    pub gather: GatherTally,
-    /// Paths inside media.
-    pub walk: WalkTally,
-    /// Where the time went.
-    pub clock: Clock,
-}
-
-/// What paths inside media cost.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(default)]
-pub struct WalkTally {
-    /// Stays of a path in a body, those included that ended before they began.
-    pub walks: u64,
-    /// Collisions.
-    pub collisions: u64,
-    /// Flights that needed no ray.
-    pub clear: u64,
-    /// Rays inside bodies.
-    pub rays: u64,
-    /// Photons traced from lamps.
-    pub photons: u64,
-    /// Their collisions that were kept.
-    pub vertices: u64,
-    /// Kept collisions looked at from camera paths.
-    pub connections: u64,
-    /// Paths that came where no light can be, by object and cause: they carry nothing.
-    pub losses: Losses,
-}
-
-impl WalkTally {
-    /// What there is to say of lost paths, a sentence for each object and cause.
-    pub fn lost(&self, scene: &Scene) -> Vec<String> {
-        self.losses.sentences(scene, self.walks)
-    }
-
-    /// Whether more paths were lost than [`TOLERATED`].
-    pub fn lost_many(&self) -> bool {
-        self.losses.are_many(self.walks)
-    }
-}
-
 /// What `volume_path` refuses to trace in a scene, each with the objects' names and a sentence ([`Obstacle::refusal`]); empty where it can
 /// be recommended. Meshes with small holes are traced with a warning.
 pub fn traceable(scene: &Scene) -> Vec<Obstacle> {
     scene.obstacles().iter().filter(|o| o.refusal().is_some()).cloned().collect()
 }
 
-impl std::ops::AddAssign for WalkTally {
-    fn add_assign(&mut self, other: Self) {
-        self.walks += other.walks;
-        self.collisions += other.collisions;
-        self.clear += other.clear;
-        self.rays += other.rays;
-        self.photons += other.photons;
-        self.vertices += other.vertices;
-        self.connections += other.connections;
-        self.losses += other.losses;
-    }
-}
-
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.gather += other.gather;
-        self.walk += other.walk;
-        self.clock += other.clock;
-    }
-}
-
-/// A part of a method that a scene may or may not need.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Part {
-    /// What it is.
-    pub name: String,
-    /// Whether it is there.
-    pub built: bool,
-    /// Why, or how large.
-    pub why: String,
-}
-
-impl Part {
-    /// A part that is there.
-    pub fn built(name: impl Into<String>, why: impl Into<String>) -> Self {
-        Self { name: name.into(), built: true, why: why.into() }
-    }
-
-    /// Rays in f64, which take the place of the backend where f32 cannot hold a scene.
-    pub fn double_precision(scene: &Scene) -> Self {
-        let name = "rays in double precision";
-        match &scene.why_double {
-            Some(why) => Self::built(name, format!("in place of the backend: {why}")),
-            None => Self::left_out(name, "single precision holds the scene"),
-        }
-    }
-
-    /// A part that is left out.
-    pub fn left_out(name: impl Into<String>, why: impl Into<String>) -> Self {
-        Self { name: name.into(), built: false, why: why.into() }
-    }
+/// The nearest hit of each camera ray.
+fn camera_hits(view: View<'_>, rays: &[CameraRay], tally: &mut Tally) -> Vec<Option<Hit>> {
+    let rays: Vec<Ray> = rays.iter().map(|r| r.ray).collect();
+    let mut hits = vec![None; rays.len()];
+    Clock::time(&mut tally.clock.rays, || view.rays.closest_batch(&rays, &mut hits));
+    tally.rays.camera += rays.len() as u64;
+    hits
 }
 
 /// A method: radiance for the camera rays of a tile.

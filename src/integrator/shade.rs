@@ -1,11 +1,12 @@
 //! Light from the lights on a Lambertian surface, shared by `direct` and `subsurface`.
 
-use super::{Part, Tally, View};
+use super::{Part, View};
 use crate::geometry::SurfacePoint;
 use crate::light::Lights;
 use crate::math::Rgb;
 use crate::sampling::PixelStream;
 use crate::scene::Scene;
+use crate::tally::Tally;
 use std::f32::consts::FRAC_1_PI;
 
 /// Direct light on diffuse surfaces.

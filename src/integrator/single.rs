@@ -1,11 +1,12 @@
 //! Light scattered once, beside models that begin with light scattered twice.
 
 use super::volume_path::VolumePath;
-use super::{CameraRay, Tally, View};
+use super::{CameraRay, View};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::query::Hit;
 use crate::scene::{Scene, Surface};
+use crate::tally::Tally;
 
 /// The first order of the objects whose models leave it out: a distance along the refracted ray of the camera, then light
 /// through the boundary, as `volume_path` does both. No formula of a plane is in it, and no model: it is exact on any shape,

@@ -12,9 +12,6 @@ mod bvh;
 #[allow(unsafe_code)] // the one room that talks to C; every block says what makes it sound
 mod embree;
 mod exact;
-mod tally;
-
-pub use tally::{LIGHTS, LightTally, RayTally};
 
 /// Points `origin + t * direction` with `t_min` < t < `t_max`.
 #[derive(Clone, Copy, Debug)]

@@ -6,9 +6,10 @@ mod framing;
 
 use crate::error::Result;
 use crate::film::{Film, Window};
-use crate::integrator::{CameraRay, Integrator, Tally, View};
+use crate::integrator::{CameraRay, Integrator, View};
 use crate::math::Rgb;
 use crate::sampling::{Pairs, PixelStream, Turn};
+use crate::tally::Tally;
 pub use first_hit::{Seen, first_hit};
 pub use framing::{Aim, nothing_in_view, shares};
 use rayon::prelude::*;

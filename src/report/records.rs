@@ -1,11 +1,9 @@
 //! One JSON line per pass.
 
-use crate::cache::{Clock, GatherTally};
 use crate::error::{Error, Result};
 use crate::film::{Counts, SelfErrors, check_replaceable, write_atomically};
 use crate::input;
-use crate::integrator::WalkTally;
-use crate::query::RayTally;
+use crate::tally::{Clock, GatherTally, RayTally, WalkTally};
 use serde::Serialize;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom, Write};

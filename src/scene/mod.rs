@@ -17,6 +17,7 @@ mod options;
 mod precision;
 mod tree;
 mod untraceable;
+mod view;
 mod warnings;
 mod world;
 
@@ -31,4 +32,5 @@ pub use obstacles::{Insides, Obstacle, ObstacleKind};
 pub use options::{
     EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
 };
+pub use view::View;
 pub use world::{Material, Object, Scene, Surface, Translucent};

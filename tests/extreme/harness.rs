@@ -4,12 +4,13 @@ use marmor::ErrorKind;
 use marmor::bssrdf::ModelName;
 use marmor::film::{Counts, Film, Image, Window};
 use marmor::integrator::{
-    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, Tally, View, VolumePath, VolumePathOptions,
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
 };
 use marmor::query::{self, Backend};
 use marmor::render::{Job, run};
 use marmor::sampling::Points;
 use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
+use marmor::tally::Tally;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 

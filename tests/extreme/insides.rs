@@ -2,10 +2,11 @@
 
 use super::harness::{backends, load_with, refused};
 use marmor::film::{Film, Window};
-use marmor::integrator::{Tally, View, VolumePath, VolumePathOptions, traceable};
+use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
 use marmor::query;
 use marmor::render::{self, Job};
 use marmor::scene::{ObstacleKind, Orders, Scene};
+use marmor::tally::Tally;
 use std::sync::atomic::AtomicBool;
 
 /// A box as OBJ text, its corners numbered from `first`; `inwards` turns its faces.
@@ -260,7 +261,7 @@ fn a_small_hole_warns() {
     let said = |word: &str| scene.obstacles().iter().any(|o| o.kind == ObstacleKind::Holes && o.what.contains(word));
     assert!(said("3 edges are rims of holes, 0.08 %"), "{:?}", scene.obstacles());
     for (_, tally) in traced(&scene, 64) {
-        let lost = tally.walk.lost(&scene);
+        let lost = marmor::integrator::lost(&tally.walk, &scene);
         assert!(
             lost.len() == 1 && lost[0].contains("object \"a\": they came through holes of its mesh (3 edges"),
             "{lost:?}"

@@ -4,11 +4,12 @@
 
 use marmor::bssrdf::ModelName;
 use marmor::geometry::{Findings, Mesh, ObjMesh, sphere};
-use marmor::integrator::{Left, View, VolumePath, VolumePathOptions, WalkTally};
+use marmor::integrator::{Left, View, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::Medium;
 use marmor::query::{self, Backend, Ray, RayQuery};
 use marmor::scene::{Camera, Insides, Material, Object, Orders, Scene, Surface, Translucent};
+use marmor::tally::WalkTally;
 use std::ops::Range;
 
 /// Where beams enter.

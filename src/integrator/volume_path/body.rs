@@ -5,12 +5,13 @@ use super::facets::Bend;
 use super::spectrum::{Coefficients, Spectrum};
 use super::through::Through;
 use crate::geometry::{Clearance, SurfacePoint};
-use crate::integrator::{Cause, View, WalkTally};
+use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium, reflect, reflectance, refract};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::Surface;
+use crate::tally::{Cause, WalkTally};
 
 /// A homogeneous medium in the closed mesh of one object. Its boundary is the triangles themselves.
 pub struct Body {

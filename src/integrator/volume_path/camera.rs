@@ -8,13 +8,14 @@ use super::draws::Draws;
 use super::spectrum::Spectrum;
 use super::through::{lamp_light, share_by_chance, sun_light, sun_share_by_chance};
 use crate::geometry::SurfacePoint;
-use crate::integrator::{Tally, View, WalkTally};
+use crate::integrator::View;
 use crate::light::{Arrival, Lights, emitted};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::{Orders, Surface};
+use crate::tally::{Tally, WalkTally};
 use std::f32::consts::FRAC_1_PI;
 
 /// A path and what it has found.

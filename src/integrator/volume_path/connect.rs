@@ -4,9 +4,10 @@ use super::body::Body;
 use super::cells::Cells;
 use super::draws::Draws;
 use super::facets::Crossing;
-use crate::integrator::{View, WalkTally};
+use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::Ray;
+use crate::tally::WalkTally;
 
 /// Photons looked at from one point; of more, every second, third, ... is taken, with the weight of all.
 const MOST_LOOKED_AT: u32 = 1024;

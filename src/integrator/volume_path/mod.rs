@@ -15,14 +15,15 @@ mod spectrum;
 mod through;
 
 use super::shade::DirectLight;
-use super::{CameraRay, Cause, Integrator, KnownLights, Part, Tally, View, WalkTally};
+use super::{CameraRay, Integrator, KnownLights, Part, View};
 use crate::error::{Error, Result};
 use crate::geometry::Clearance;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
-use crate::query::{Hit, RayTally};
+use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface};
+use crate::tally::{Cause, RayTally, Tally, WalkTally};
 use body::Body;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
@@ -245,7 +246,7 @@ impl Integrator for VolumePath {
             }
             return;
         }
-        let hits = view.camera_hits(rays, tally);
+        let hits = super::camera_hits(view, rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
                 None => self.of_order_0(self.light.lights.environment(ray.ray.direction)),

@@ -4,8 +4,9 @@ use super::VolumePath;
 use super::body::{Edge, Watch};
 use super::draws::Draws;
 use super::spectrum::Spectrum;
-use crate::integrator::{View, WalkTally};
+use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
+use crate::tally::WalkTally;
 
 /// Light that has left a body.
 #[derive(Clone, Copy, Debug)]

@@ -5,13 +5,13 @@ use super::cells::Cells;
 use super::draws::Draws;
 use super::spectrum::Spectrum;
 use crate::geometry::{AreaTable, SurfacePoint};
-use crate::integrator::{View, WalkTally};
+use crate::integrator::View;
 use crate::light::{Arrival, Lights};
 use crate::math::{DVec3, Rgb, Vec3, hash_combine};
 use crate::optics::{refract, transmittance};
-use crate::query::RayTally;
 use crate::sampling::{CacheStream, Points, Turn};
 use crate::scene::Scene;
+use crate::tally::{RayTally, WalkTally};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 

@@ -4,12 +4,13 @@ use super::body::{Body, Straight};
 use super::draws::Draws;
 use super::facets::{Bend, Crossing, Facets, Towards};
 use super::spectrum::Spectrum;
-use crate::integrator::{Tally, View, WalkTally};
+use crate::integrator::View;
 use crate::light::{LampPoint, Lights, SunDirection};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::transmittance;
 use crate::query::{Hit, Ray};
 use crate::scene::Scene;
+use crate::tally::{Tally, WalkTally};
 use std::f32::consts::PI;
 
 /// What a body needs to be asked for the light of lamps and suns.

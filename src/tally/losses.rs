@@ -1,6 +1,5 @@
 //! Paths that came where no light can be: how many, at which object, and why.
 
-use crate::scene::{ObstacleKind, Scene};
 use serde::{Deserialize, Serialize};
 
 /// Why a path was lost.
@@ -45,6 +44,11 @@ pub struct Losses {
 pub const TOLERATED: f64 = 1e-3;
 
 impl Losses {
+    /// Those beyond the pairs that are counted apart.
+    pub fn others(&self) -> u64 {
+        self.others
+    }
+
     /// One more.
     pub fn add(&mut self, object: u32, cause: Cause) {
         self.count(Loss { object, cause, paths: 1 });
@@ -80,63 +84,6 @@ impl Losses {
     /// Whether that is more than [`TOLERATED`] of `paths`.
     pub fn are_many(&self, paths: u64) -> bool {
         self.total() as f64 > TOLERATED * paths as f64
-    }
-
-    /// A sentence for each object and cause, of `paths` paths: number, name, cause and remedy.
-    pub fn sentences(&self, scene: &Scene, paths: u64) -> Vec<String> {
-        let share = |n: u64| 100.0 * n as f64 / paths.max(1) as f64;
-        let mut said: Vec<String> = self
-            .each()
-            .map(|loss| {
-                let name = scene.objects.get(loss.object as usize).map_or("?", |o| o.name.as_str());
-                let (n, why) = (loss.paths, why(scene, name, loss.cause));
-                format!(
-                    "{n} of {paths} paths ({:.2} %) were lost at object {name:?}: {why}; they carry nothing",
-                    share(n)
-                )
-            })
-            .collect();
-        if self.others > 0 {
-            let n = self.others;
-            said.push(format!(
-                "{n} of {paths} paths ({:.2} %) were lost at other objects; they carry nothing",
-                share(n)
-            ));
-        }
-        said
-    }
-}
-
-/// Cause and remedy.
-fn why(scene: &Scene, name: &str, cause: Cause) -> String {
-    match cause {
-        Cause::Hole => {
-            let edges = scene.objects.iter().find(|o| o.name == name).map_or(0, |o| o.findings.open_edges);
-            format!("they came through holes of its mesh ({edges} edges belong to one triangle alone): close them")
-        }
-        Cause::WrongSide => "they met backs of faces that disagree about the outside: --repair turns faces".into(),
-        Cause::Blemish => "its surface passes through itself: a union of the mesh with itself mends that".into(),
-        Cause::OtherMedium => {
-            let overlaps = |kind: ObstacleKind| {
-                matches!(kind, ObstacleKind::Crossing | ObstacleKind::Nested | ObstacleKind::Touching)
-            };
-            let with = scene.obstacles().iter().filter(|o| overlaps(o.kind) && o.objects.len() == 2);
-            let others: Vec<String> = with
-                .filter(|o| o.objects.iter().any(|other| other == name))
-                .flat_map(|o| o.objects.iter().filter(|other| *other != name))
-                .map(|other| format!("{other:?}"))
-                .collect();
-            if others.is_empty() {
-                "they met another medium inside it, put there by rounding: leave a larger gap between the two".into()
-            } else {
-                format!("they met {} inside it: move them apart, or make one mesh of both", others.join(", "))
-            }
-        }
-        Cause::Rounding => {
-            "rounding put them on the other side of its surface: make what is thinnest thicker, or bring \
-                            what is far away nearer"
-                .into()
-        }
     }
 }
 

@@ -1,0 +1,42 @@
+//! What gathering over cached samples cost.
+
+/// What gathering cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct GatherTally {
+    /// Samples attempted by all fills.
+    pub samples: u64,
+    /// Of these, samples that carry light.
+    pub lit: u64,
+    /// Exit points gathered at.
+    pub exits: u64,
+    /// Nodes of trees visited.
+    pub nodes: u64,
+    /// Pairs of exit point and cached sample looked at.
+    pub pairs: u64,
+    /// Points of the near field found along the lines of some exits.
+    pub near_points: u64,
+    /// Pairs of an exit and a point of the near field, where S_d was evaluated.
+    pub near: u64,
+    /// Pairs where S_d was evaluated: those kept by rejection control, all of a plain sum, or those in a cut.
+    pub evaluated: u64,
+    /// Samples left out because a number of theirs is NaN or infinite.
+    pub non_finite: u64,
+    /// Values of S_d below zero that were taken as 0, one for each pair and channel.
+    pub clamped: u64,
+}
+
+impl std::ops::AddAssign for GatherTally {
+    fn add_assign(&mut self, other: Self) {
+        self.samples += other.samples;
+        self.lit += other.lit;
+        self.exits += other.exits;
+        self.nodes += other.nodes;
+        self.pairs += other.pairs;
+        self.evaluated += other.evaluated;
+        self.near_points += other.near_points;
+        self.near += other.near;
+        self.non_finite += other.non_finite;
+        self.clamped += other.clamped;
+    }
+}

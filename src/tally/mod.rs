@@ -1,0 +1,76 @@
+//! What work cost: counts and seconds, added up over tasks and passes. Not for: what is said of them.
+
+mod clock;
+mod gather;
+mod losses;
+mod rays;
+
+pub use clock::Clock;
+pub use gather::GatherTally;
+pub use losses::{Cause, Loss, Losses, TOLERATED};
+pub use rays::{LIGHTS, LightTally, RayTally};
+
+/// What the work cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Tally {
+    /// Rays by kind.
+    pub rays: RayTally,
+    /// Cached samples and pairs.
+    pub gather: GatherTally,
+    /// Paths inside media.
+    pub walk: WalkTally,
+    /// Where the time went.
+    pub clock: Clock,
+}
+
+/// What paths inside media cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct WalkTally {
+    /// Stays of a path in a body, those included that ended before they began.
+    pub walks: u64,
+    /// Collisions.
+    pub collisions: u64,
+    /// Flights that needed no ray.
+    pub clear: u64,
+    /// Rays inside bodies.
+    pub rays: u64,
+    /// Photons traced from lamps.
+    pub photons: u64,
+    /// Their collisions that were kept.
+    pub vertices: u64,
+    /// Kept collisions looked at from camera paths.
+    pub connections: u64,
+    /// Paths that came where no light can be, by object and cause: they carry nothing.
+    pub losses: Losses,
+}
+
+impl WalkTally {
+    /// Whether more paths were lost than [`TOLERATED`].
+    pub fn lost_many(&self) -> bool {
+        self.losses.are_many(self.walks)
+    }
+}
+
+impl std::ops::AddAssign for WalkTally {
+    fn add_assign(&mut self, other: Self) {
+        self.walks += other.walks;
+        self.collisions += other.collisions;
+        self.clear += other.clear;
+        self.rays += other.rays;
+        self.photons += other.photons;
+        self.vertices += other.vertices;
+        self.connections += other.connections;
+        self.losses += other.losses;
+    }
+}
+
+impl std::ops::AddAssign for Tally {
+    fn add_assign(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.gather += other.gather;
+        self.walk += other.walk;
+        self.clock += other.clock;
+    }
+}
