@@ -11,7 +11,7 @@
 //! | 4 | [`scene`]: the file as typed, and the checked world |
 //! | 3 | [`query`]: nearest hit · [`bssrdf`]: one file per model · [`film`]: sums, EXR, PNG, metrics |
 //! | 2 | [`geometry`]: meshes, area table · [`optics`]: Fresnel, media · [`sampling`]: Owen-Sobol streams |
-//! | 1 | [`math`], [`error`], [`memory`], [`input`] |
+//! | 1 | [`math`], [`error`], [`memory`], [`input`], [`words`] |
 //!
 //! The command line is the binary's own room, `cli`, above all of these.
 #![deny(unsafe_code)]
@@ -37,5 +37,6 @@ pub mod render;
 pub mod report;
 pub mod sampling;
 pub mod scene;
+pub mod words;
 
 pub use error::{Error, ErrorKind, Result};

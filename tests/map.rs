@@ -23,6 +23,7 @@ const ROWS: &[(&str, u32)] = &[
     ("memory", 1),
     ("input", 1),
     ("error", 1),
+    ("words", 1),
 ];
 
 fn row(room: &str) -> Option<u32> {

@@ -10,6 +10,7 @@ use super::polygon::triangulate;
 use super::{ObjMesh, ObjNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
+use crate::words::counted;
 
 /// Memory while a mesh is read, looked at and put into a tree [bytes/triangle], at its most; measured with 4 million.
 pub const LOADING_BYTES: usize = 230;
@@ -93,7 +94,11 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
             } else if lines.vertices() == 0 {
                 "and no vertices either; is it an OBJ file?".into()
             } else {
-                format!("{} vertices, {} points and lines", lines.vertices(), lines.ignored())
+                format!(
+                    "{}, {}",
+                    counted(lines.vertices(), "vertex", "vertices"),
+                    counted(lines.ignored(), "point or line", "points and lines")
+                )
             }
         )));
     }

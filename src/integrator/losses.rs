@@ -1,6 +1,7 @@
 //! Paths that came where no light can be: how many, at which object, and why.
 
 use crate::scene::{ObstacleKind, Scene};
+use crate::words::{counted, digits, either};
 use serde::{Deserialize, Serialize};
 
 /// Why a path was lost.
@@ -84,23 +85,27 @@ impl Losses {
 
     /// A sentence for each object and cause, of `paths` paths: number, name, cause and remedy.
     pub fn sentences(&self, scene: &Scene, paths: u64) -> Vec<String> {
-        let share = |n: u64| 100.0 * n as f64 / paths.max(1) as f64;
+        let share = |n: u64| format!("{} %", digits(100.0 * n as f64 / paths.max(1) as f64, 2));
         let mut said: Vec<String> = self
             .each()
             .map(|loss| {
                 let name = scene.objects.get(loss.object as usize).map_or("?", |o| o.name.as_str());
                 let (n, why) = (loss.paths, why(scene, name, loss.cause));
                 format!(
-                    "{n} of {paths} paths ({:.2} %) were lost at object {name:?}: {why}; they carry nothing",
-                    share(n)
+                    "{n} of {paths} {} ({}) {} lost at object {name:?}: {why}; they carry nothing",
+                    either(paths, "path", "paths"),
+                    share(n),
+                    either(n, "was", "were")
                 )
             })
             .collect();
         if self.others > 0 {
             let n = self.others;
             said.push(format!(
-                "{n} of {paths} paths ({:.2} %) were lost at other objects; they carry nothing",
-                share(n)
+                "{n} of {paths} {} ({}) {} lost at other objects; they carry nothing",
+                either(paths, "path", "paths"),
+                share(n),
+                either(n, "was", "were")
             ));
         }
         said
@@ -112,7 +117,8 @@ fn why(scene: &Scene, name: &str, cause: Cause) -> String {
     match cause {
         Cause::Hole => {
             let edges = scene.objects.iter().find(|o| o.name == name).map_or(0, |o| o.findings.open_edges);
-            format!("they came through holes of its mesh ({edges} edges belong to one triangle alone): close them")
+            let edges = counted(edges, "edge belongs", "edges belong");
+            format!("they came through holes of its mesh ({edges} to one triangle alone): close them")
         }
         Cause::WrongSide => "they met backs of faces that disagree about the outside: --repair turns faces".into(),
         Cause::Blemish => "its surface passes through itself: a union of the mesh with itself mends that".into(),

@@ -17,6 +17,7 @@ use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{CacheStream, PixelStream, Points, Turn};
 use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface};
+use crate::words::{counted, short};
 use std::sync::OnceLock;
 
 /// A cached sample, its columns twice while the tree is built, and its share of the tree.
@@ -278,9 +279,9 @@ impl Subsurface {
             (Some(near), _) => Part::built(
                 part,
                 format!(
-                    "light within {:.3} is sampled for each exit, {} samples serve for the rest",
-                    near.radius(),
-                    body.samples
+                    "light within {} units is sampled for each exit, {} for the rest",
+                    short(near.radius().into()),
+                    counted(body.samples, "sample serves", "samples serve")
                 ),
             ),
             (None, Estimator::Notes | Estimator::Thinned) => {
@@ -400,10 +401,10 @@ impl Integrator for Subsurface {
             parts.push(Part::built(
                 format!("sample cache of `{name}`"),
                 format!(
-                    "{} samples a pass ({:.1} MB), {} triangles",
-                    body.samples,
+                    "{} a pass ({:.1} MB), {}",
+                    counted(body.samples, "sample", "samples"),
                     bytes as f64 / 1e6,
-                    body.table.len()
+                    counted(body.table.len(), "triangle", "triangles")
                 ),
             ));
             parts.push(self.tree_part(name, body));
