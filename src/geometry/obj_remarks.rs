@@ -121,7 +121,8 @@ impl OddLines {
             })),
             unused
                 .filter(|&n| n > 0 && self.half_shaded.count == 0)
-                .map(|unused| format!("no face refers to any of its {}: it is shaded flat; set `normals`", counted(unused, "normal", "normals"))),
+                .map(|n| if n == 1 { "its one normal".into() } else { format!("any of its {n} normals") })
+                .map(|which| format!("no face refers to {which}: it is shaded flat; set `normals`")),
         ]
         .into_iter()
         .flatten()
