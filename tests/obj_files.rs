@@ -142,7 +142,7 @@ fn obj_files_that_are_refused_by_line() {
         (b"", ": no faces: the file is empty"),
         (b"hello\nworld", ": no faces: and no vertices"),
         (b"\x00\x01\xff\xfe\x00binary\n\x89PNG", ": no faces"),
-        (b"v 0 0 0\nv 1 0 0\nl 1 2", ": no faces: 2 vertices, 1 points and lines"),
+        (b"v 0 0 0\nv 1 0 0\nl 1 2", ": no faces: 2 vertices, 1 point or line"),
     ];
     for (text, fragment) in cases {
         let case = String::from_utf8_lossy(text);
