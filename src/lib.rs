@@ -11,7 +11,7 @@
 //! | 4 | [`scene`]: the file as typed, and the checked world |
 //! | 3 | [`query`]: nearest hit · [`bssrdf`]: one file per model · [`film`]: sums, EXR, PNG, metrics |
 //! | 2 | [`geometry`]: meshes, area table · [`optics`]: Fresnel, media · [`sampling`]: Owen-Sobol streams |
-//! | 1 | [`math`], [`error`], [`memory`], [`input`], [`tally`] |
+//! | 1 | [`math`], [`error`], [`memory`], [`input`], [`tally`], [`words`] |
 //!
 //! The command line is the binary's own room, `cli`, above all of these.
 #![deny(unsafe_code)]
@@ -38,5 +38,6 @@ pub mod report;
 pub mod sampling;
 pub mod scene;
 pub mod tally;
+pub mod words;
 
 pub use error::{Error, ErrorKind, Result};

@@ -130,9 +130,7 @@ fn statistics_hold_what_was_said() {
 #[test]
 fn every_remedy_does_what_it_says() {
     let grey = "-D material.wax.sigma_s_prime=1.8 -D material.wax.sigma_a=0.2";
-    for (thickness, medium, model) in
-        [(2.5, "", "slab"), (1.2, "", "slab"), (0.6, "", "directional"), (8.0, grey, "beam")]
-    {
+    for (thickness, medium, model) in [(2.5, "", "slab"), (8.0, "", "beam"), (8.0, grey, "beam")] {
         let folder = command::folder(&scene(&mesh("block")));
         fs::write(folder.path().join("block.obj"), block(thickness, false)).unwrap();
         let before = error(folder.path(), medium);
@@ -211,7 +209,10 @@ fn an_open_sheet_is_not_thick_and_nothing_that_needs_an_inside_is_advised() {
         assert!(all.contains("give it a thickness") && all.contains("error not known, of no model"), "{all}");
         assert!(!all.contains("endless") && !all.contains("--m") && !all.contains("%, "), "{all}");
         let told = line(folder.path(), "body", "");
-        assert!(told.contains("its error is not known: its mesh has no inside; give it a thickness"), "{told}");
+        // The remedy is in the warning, once.
+        assert!(told.ends_with("its error is not known: its mesh has no inside"), "{told}");
+        let rendered = said(folder.path(), "render scene.toml -o x.exr --spp 1");
+        assert_eq!(rendered.matches("give it a thickness").count(), 1, "{rendered}");
         let body = json(folder.path(), "")["validity"][0].clone();
         assert_eq!((&body["open"], &body["take"], &body["verdict"]), (&1.0.into(), &().into(), &"open".into()));
         assert!(body["thickness"][1].is_null() && body["models"][0]["distribution"].is_null(), "{body:#}");
@@ -255,10 +256,7 @@ fn path_tracing_is_advised_where_it_can_trace() {
 fn faces_that_look_inwards_have_no_figure_until_they_are_turned() {
     let folder = command::folder(&scene(&ball("ball", 0.0, 2.0, "wax", "flip = true")));
     let told = line(folder.path(), "ball", "");
-    assert_eq!(
-        told,
-        "ball: model `standard`, its error is not known: its faces look inwards; turn its faces: --repair, or flip = true in the scene"
-    );
+    assert_eq!(told, "ball: model `standard`, its error is not known: its faces look inwards");
     assert!(line(folder.path(), "ball", "--repair").contains("expected error 34 %"));
     assert_eq!(json(folder.path(), "")["validity"][0]["take"], "--repair");
 }
@@ -267,11 +265,11 @@ fn faces_that_look_inwards_have_no_figure_until_they_are_turned() {
 fn what_has_not_been_measured_has_no_figure_anywhere() {
     let folder = command::folder(&scene(&ball("ball", 0.0, 2.0, "wax", "")));
     for (medium, part) in [
-        ("-D material.wax.sigma_a=0", "measured for reduced albedos of 0.3 to 0.9999, here 1.0000"),
+        ("-D material.wax.sigma_a=0", "measured for reduced albedos of 0.3 to 0.9999, here 1"),
         ("-D material.wax.sigma_a=10", "measured for reduced albedos of 0.3 to 0.9999, here 0.1665"),
-        ("-D material.wax.g=-0.5", "measured for g 0 to 0.8, here -0.500"),
-        ("-D material.wax.g=0.9", "measured for g 0 to 0.8, here 0.900"),
-        ("-D material.wax.eta=1.6", "measured for eta 1 to 1.5, here 1.600"),
+        ("-D material.wax.g=-0.5", "measured for g 0 to 0.8, here -0.5"),
+        ("-D material.wax.g=0.9", "measured for g 0 to 0.8, here 0.9"),
+        ("-D material.wax.eta=1.6", "measured for eta 1 to 1.5, here 1.6"),
         ("-D material.wax.sigma_s_prime=0.1", "thinner than 1 transport mean free path, where no model holds"),
         ("--model slab -D material.wax.thickness=1", "most of the body is no slab of 1 units"),
     ] {
@@ -293,21 +291,22 @@ fn an_empty_picture_is_said_with_where_to_look() {
     let away = "-D camera.look_at=[30,0,12]";
     let all = said(folder.path(), &format!("render scene.toml -o x.exr {away}"));
     assert!(
-        all.contains("the camera sees none of the 1 objects, the background alone: \"ball\" lies behind the camera")
-            || all.contains("\"ball\" lies 90 degrees away from the direction of view"),
+        all.contains(
+            "the camera sees nothing of the one object, the background alone: \"ball\" lies behind the camera"
+        ) || all.contains("\"ball\" lies 90 degrees away from the direction of view"),
         "{all}"
     );
     assert!(all.contains("estimated relMSE: nothing to measure") && !all.contains("relMSE 0"), "{all}");
-    let words = all.lines().find(|l| l.contains("sees none")).unwrap().rsplit("to look at it: ").next().unwrap();
+    let words = all.lines().find(|l| l.contains("sees nothing")).unwrap().rsplit("to look at it: ").next().unwrap();
     let seen = said(folder.path(), &format!("render scene.toml -o x.exr {words}"));
-    assert!(!seen.contains("sees none") && seen.contains("estimated relMSE "), "{seen}");
+    assert!(!seen.contains("sees nothing") && seen.contains("estimated relMSE "), "{seen}");
     let checked = json(folder.path(), away);
     assert_eq!(checked["objects"][0]["in_picture"], 0.0);
     assert!(
-        checked["warnings"][0].as_str().unwrap().contains("sees none") && checked["look_at"].is_array(),
+        checked["warnings"][0].as_str().unwrap().contains("sees nothing") && checked["look_at"].is_array(),
         "{checked:#}"
     );
-    let told = |more: &str| said(folder.path(), &format!("check scene.toml {more}")).contains("sees none");
+    let told = |more: &str| said(folder.path(), &format!("check scene.toml {more}")).contains("sees nothing");
     assert!(!told("") && told(away) && told("-D camera.look_at=[0,0,30]"), "straight away from it");
     // Seen in part, by a corner, or by less than a pixel, it is seen.
     assert!(!told("-D camera.look_at=[4.5,0,0]"));
@@ -316,7 +315,7 @@ fn an_empty_picture_is_said_with_where_to_look() {
     // A part of the picture.
     let cropped = said(folder.path(), "render scene.toml -o x.exr --crop 0,0,2,2");
     assert!(
-        cropped.contains("the crop shows none of the 1 objects") && cropped.contains("render without --crop"),
+        cropped.contains("the crop shows nothing of the one object") && cropped.contains("render without --crop"),
         "{cropped}"
     );
 }

@@ -3,6 +3,9 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
+#[path = "../src/geometry/test_shapes.rs"]
+mod shapes;
+
 use marmor::film::{Film, Window};
 use marmor::geometry::{ObjMesh, write_obj};
 use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
@@ -11,6 +14,7 @@ use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::scene::{ObstacleKind, Orders, Scene, SceneFile};
 use marmor::tally::TOLERATED;
+use shapes::{cuboid, joined};
 use std::sync::atomic::AtomicBool;
 
 /// Numbers of one scene.
@@ -35,26 +39,6 @@ impl Dice {
         let r = (1.0 - z * z).sqrt();
         DVec3::new(r * phi.cos(), r * phi.sin(), z)
     }
-}
-
-/// A box, each face cut into `n` by `n` squares, the diagonals one way or the other.
-fn cuboid(half: DVec3, n: u32, other: bool) -> ObjMesh {
-    let mut mesh = ObjMesh::default();
-    for axis in 0..3 {
-        let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
-        for (w, u) in [(DVec3::AXES[axis], u), (-DVec3::AXES[axis], -u)] {
-            for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
-                let base = mesh.positions.len() as u32;
-                for (a, b) in [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)] {
-                    let at = |k: u32| (2.0 * f64::from(k) - f64::from(n)) / f64::from(n);
-                    mesh.positions.push(half * (w + u * at(a) + v * at(b)));
-                }
-                let quads = if other { [[0, 1, 3], [1, 2, 3]] } else { [[0, 1, 2], [0, 2, 3]] };
-                mesh.triangles.extend(quads.map(|t| t.map(|k| base + k)));
-            }
-        }
-    }
-    mesh
 }
 
 fn torus(large: f64, small: f64, n: u32) -> ObjMesh {
@@ -83,7 +67,7 @@ fn body(dice: &mut Dice, boxes: bool) -> Body {
     let (mesh, radius, half) = match if boxes { 0 } else { dice.below(3) } {
         0 => {
             let half = DVec3::new(dice.between(0.3, 1.0), dice.between(0.3, 1.0), dice.between(0.3, 1.0)) * size;
-            (cuboid(half, 1 + dice.below(3), dice.below(2) == 0), half.length(), Some(half))
+            (cuboid(DVec3::ZERO, half, 1 + dice.below(3), dice.below(2) == 0), half.length(), Some(half))
         }
         1 => {
             let mut ball = marmor::geometry::sphere(DVec3::ZERO, size, 6 + dice.below(6), 9 + dice.below(9));
@@ -186,7 +170,7 @@ fn place(dice: &mut Dice, last: &Body, how: Placed) -> Body {
             let mut bar = DVec3::splat(0.2 * half.min_element());
             bar[axis] = 2.0 * last.radius;
             new = Body {
-                mesh: cuboid(bar, 1 + dice.below(3), false),
+                mesh: cuboid(DVec3::ZERO, bar, 1 + dice.below(3), false),
                 centre: DVec3::ZERO,
                 radius: bar.length(),
                 half: Some(bar),
@@ -201,13 +185,6 @@ fn place(dice: &mut Dice, last: &Body, how: Placed) -> Body {
     }
     new.centre += last.centre;
     new
-}
-
-fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
-    let base = a.positions.len() as u32;
-    a.positions.extend(&b.positions);
-    a.triangles.extend(b.triangles.iter().map(|t| t.map(|i| base + i)));
-    a
 }
 
 fn area(mesh: &ObjMesh) -> f64 {

@@ -24,6 +24,7 @@ const ROWS: &[(&str, u32)] = &[
     ("input", 1),
     ("error", 1),
     ("tally", 1),
+    ("words", 1),
 ];
 
 fn row(room: &str) -> Option<u32> {

@@ -247,7 +247,7 @@ fn f64_is_taken_where_it_is_needed_and_said_with_numbers() {
     // A floor far below moves no body of its own.
     assert_eq!(why(Place { floor: 1e2, ..FLAT }, VAN_DE_HULST), None);
     let wide = why(Place { width: 2e4, ..FLAT }, VAN_DE_HULST).unwrap();
-    assert!(wide.contains("object \"slab\" is 2.000e-1 units thick") && wide.contains("start 3.8e-2 units"), "{wide}");
+    assert!(wide.contains("object \"slab\" is 0.2 units thick") && wide.contains("start 3.8e-2 units"), "{wide}");
     let floor = why(Place { floor: 1e7, ..FLAT }, VAN_DE_HULST).unwrap();
     assert!(floor.contains("away from object \"floor\""), "{floor}");
     let dense = why(FLAT, "sigma_a = 1\nsigma_s = 9e6\ng = 0\neta = 1.3").unwrap();
@@ -261,7 +261,7 @@ fn f64_is_taken_where_it_is_needed_and_said_with_numbers() {
 fn what_f64_cannot_hold_either_is_warned_of() {
     let beyond = Place { width: 1e12, ..FLAT }.scene(VAN_DE_HULST).warnings.join("\n");
     assert!(
-        beyond.contains("object \"slab\": it is 2.0e-1 units thick on") && beyond.contains("make it thicker"),
+        beyond.contains("object \"slab\": it is 0.2 units thick on") && beyond.contains("make it thicker"),
         "{beyond}"
     );
     assert_eq!(Place { width: 2e6, ..FLAT }.scene(VAN_DE_HULST).warnings, Vec::<String>::new());

@@ -2,6 +2,7 @@
 
 use super::{ModelKind, ModelName};
 use crate::optics::{ChannelOptics, Medium, Trust};
+use crate::words::{albedo, digits};
 
 /// Whichever [`choose`] finds best.
 pub(super) static MODEL: ModelKind = ModelKind {
@@ -52,12 +53,12 @@ pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
             return Choice { name: ModelName::SLAB, why, trusted };
         }
         if relative <= LEAST_THICKNESS {
-            let why = format!("{relative:.2} transport mean free paths thick, below 2: no model is near");
+            let why = format!("{} transport mean free paths thick, below 2: no model is near", digits(relative, 3));
             return Choice { name: ModelName::BEAM, why, trusted: false };
         }
     }
     let least = optics.iter().map(|k| k.alpha_prime).fold(f64::INFINITY, f64::min);
-    let numbers = format!("least reduced albedo {least:.3}, g {:.3}", medium.g);
+    let numbers = format!("least reduced albedo {}, g {}", albedo(least), medium.g);
     let verdict = match trust {
         Trust::Diffusion | Trust::WithSingleScattering => "the nearest model to transport",
         Trust::Marginal => "the nearest model to transport, marginal here",

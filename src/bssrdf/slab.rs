@@ -8,6 +8,7 @@ use super::{Bssrdf, Claims, Entry, Exit, ModelKind, ModelName};
 use crate::error::{Error, Result};
 use crate::math::{Level, Rgb, dispatch_at, times_exp2};
 use crate::optics::{FresnelMoments, Medium};
+use crate::words::digits;
 use std::f64::consts::{LOG2_E, PI};
 
 pub(super) static MODEL: ModelKind = ModelKind {
@@ -172,8 +173,9 @@ fn check_thickness(thickness: f32, relative: f64, channel: usize) -> Result<()> 
     let name = ["red", "green", "blue"][channel];
     if relative.is_nan() || relative <= THINNEST {
         return Err(Error::scene(format!(
-            "slab of thickness {thickness}: {relative:.3} transport mean free paths in {name}, and the model needs \
-             more than one (two to be trusted); use a volume path tracer or a thicker slab"
+            "slab of thickness {thickness}: {} transport mean free paths in {name}, and the model needs more than one (two \
+             to be trusted); use method `volume_path` or a thicker slab",
+            digits(relative, 3)
         )));
     }
     if relative > THICKEST {

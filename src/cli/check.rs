@@ -1,6 +1,6 @@
 //! `marmor check`: what is in a scene, what will be built, and what is left out.
 
-use super::advice::{Advice, short};
+use super::advice::Advice;
 use super::files::{Files, Remedy};
 use super::need;
 use super::setup::{MethodArgs, prepare};
@@ -8,9 +8,10 @@ use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
 use marmor::geometry::{Mended, load_obj, mended, write_obj};
 use marmor::integrator::{TOLERANCE, View};
-use marmor::optics::Medium;
+use marmor::optics::{ChannelOptics, Medium};
 use marmor::query;
 use marmor::scene::{Geometry, Object, Scene, Surface};
+use marmor::words::{albedo, counted, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -55,7 +56,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             "unit_in_mm": scene.unit_in_mm,
             "resolution": [width, height],
             "method": prepared.method.name(),
-            "backend": prepared.backend.name(),
+            "backend": rays.description(),
             "objects": objects.map(|(object, share)| object_json(scene, object, *share)).collect::<Vec<_>>(),
             "parts": parts,
             "validity": advice.bodies.iter().map(|t| advice.json(t)).collect::<Vec<_>>(),
@@ -72,8 +73,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     }
     let unit = scene.unit_in_mm.map_or("unit not declared".into(), |mm| format!("1 unit = {mm} mm"));
     println!("{}: {unit}, {width}x{height} pixels", scene.name);
-    let backend = if scene.why_double.is_some() { "rays in double precision" } else { prepared.backend.name() };
-    println!("method {} on {backend}", prepared.method.name());
+    println!("method {} on {}", prepared.method.name(), rays.description());
     if !warnings.is_empty() {
         println!("\nwarnings");
         warnings.iter().for_each(|warning| println!("  {warning}"));
@@ -118,7 +118,8 @@ fn tell(scene: &Scene, object: &Object, share: f64) {
     let lengths = |v: [f64; 3], by: &str| v.map(short).join(by);
     let mm = scene.unit_in_mm.filter(|mm| *mm != 1.0);
     let in_mm = mm.map_or(String::new(), |mm| format!(" ({} mm)", lengths(size.map(|s| s * mm), " x ")));
-    println!("  {}: {} triangles, {} units{in_mm}", object.name, object.mesh.triangles.len(), lengths(size, " x "));
+    let triangles = counted(object.mesh.triangles.len(), "triangle", "triangles");
+    println!("  {}: {triangles}, {} units{in_mm}", object.name, lengths(size, " x "));
     println!(
         "    from ({}) to ({}); {}",
         lengths(bounds[0], ", "),
@@ -126,7 +127,7 @@ fn tell(scene: &Scene, object: &Object, share: f64) {
         match share {
             0.0 => "not in the picture, or tiny in it".into(),
             share if share < 0.01 => "less than 1 % of the picture".into(),
-            share => format!("{:.0} % of the picture", 100.0 * share),
+            share => format!("{} of the picture", percent(share)),
         }
     );
     println!(
@@ -236,9 +237,9 @@ fn describe(surface: &Surface) -> Vec<String> {
             vec![
                 format!("translucent, {}, model {}", t.source, t.model_text()),
                 format!(
-                    "eta {}, reduced albedo {:.4?}, transport mean free path [{}] unit",
+                    "eta {}, reduced albedo [{}], transport mean free path [{}] unit",
                     t.medium.eta,
-                    t.medium.alpha_prime().0,
+                    ChannelOptics::of(&t.medium).map(|k| albedo(k.alpha_prime)).join(", "),
                     free_path.0.map(|l| short(l.into())).join(", ")
                 ),
             ]

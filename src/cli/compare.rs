@@ -9,6 +9,7 @@ use marmor::math::Rgb;
 use marmor::render::{Seen, first_hit};
 use marmor::report::{Compared, Figures, ModelComparison, Picture, PicturePart, common_range, false_colours};
 use marmor::scene::MethodName;
+use marmor::words::counted;
 use marmor::{Error, Result};
 use std::path::Path;
 use std::process::ExitCode;
@@ -64,7 +65,7 @@ fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<Ex
         }
     };
     reference.truth.check(&runners[0].film)?;
-    args.say(&format!("{} models in turns, {budget:.0} s each", runners.len()));
+    args.say(&format!("{} in turns, {budget:.0} s each", counted(runners.len(), "model", "models")));
     let whole = race(&mut runners, budget, &cancel, |_, runner| runner.follow())?;
     args.leave_out_empty(&mut runners);
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
@@ -101,7 +102,8 @@ fn write(
             let path = folder.join(format!("{file}_{suffix}.exr"));
             failed.note(save(image, &path, &Metadata::default(), PngOptions::default()));
         }
-        let note = format!("{} samples, {:.1} s", runner.film.passes(), runner.seconds.total());
+        let samples = counted(runner.film.passes(), "sample", "samples");
+        let note = format!("{samples}, {:.1} s", runner.seconds.total());
         pictures.push(picture(&image, name, note, exposure)?);
         relatives.push((name.clone(), file, relative));
         models.push(Compared {

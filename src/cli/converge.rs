@@ -6,6 +6,7 @@ use super::race::{Failures, RaceArgs, Reference, Runner, command, machine, race,
 use marmor::Result;
 use marmor::film::{Image, Truth, Window, png_bytes};
 use marmor::report::{Convergence, ErrorCurve, Picture, Record, RecordFile};
+use marmor::words::counted;
 use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
@@ -58,7 +59,7 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
         .map(|r| ErrorCurve { name: r.entrant.name.clone(), seconds_setup: r.seconds_setup, points: Vec::new() })
         .collect();
     let (mut next, mut told) = (vec![1; runners.len()], 0);
-    args.say(&format!("{} methods in turns, {budget:.0} s each", runners.len()));
+    args.say(&format!("{} in turns, {budget:.0} s each", counted(runners.len(), "method", "methods")));
     let whole = race(&mut runners, budget, &cancel, |i, runner| {
         let passes = runner.film.passes();
         // Measuring takes milliseconds; steps of 3 % leave out nothing that a plot shows.
@@ -122,9 +123,9 @@ fn reference(
     let [mut runner] = runners;
     let truth = Truth::of_film(&runner.film, &mut runner.own);
     let text = format!(
-        "{}, another seed, {} samples of each pixel in {:.1} s; {}",
+        "{}, another seed, {} of each pixel in {:.1} s; {}",
         entrant.prepared.describe(),
-        runner.film.passes(),
+        counted(runner.film.passes(), "sample", "samples"),
         runner.seconds.total(),
         noise_text(&truth)
     );
@@ -162,7 +163,8 @@ fn write_report(
     };
     let (mut crops, mut thumbnails) = (Vec::new(), Vec::new());
     for (image, runner) in images.iter().zip(runners) {
-        let note = format!("{} samples, {:.1} s", runner.film.passes(), runner.seconds.total());
+        let samples = counted(runner.film.passes(), "sample", "samples");
+        let note = format!("{samples}, {:.1} s", runner.seconds.total());
         crops.push(picture(&image.cropped(part), &runner.entrant.name, note.clone(), true)?);
         thumbnails.push(picture(&image.shrunk(THUMBNAIL), &runner.entrant.name, note, false)?);
     }

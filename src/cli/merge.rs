@@ -5,6 +5,7 @@ use super::layers::{LayerName, Layers};
 use super::outputs::{Outputs, progress};
 use marmor::film::{Checkpoint, check_writable};
 use marmor::scene::difference;
+use marmor::words::counted;
 use marmor::{Error, Result};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -66,7 +67,12 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let said = outputs.save(&film, &spent)?;
     if !args.quiet {
         said.iter().for_each(|line| eprintln!("{line}"));
-        eprintln!("merged {} files: passes {} ({} in all)", args.parts.len(), film.ranges_text(), film.passes());
+        eprintln!(
+            "merged {}: passes {} ({} in all)",
+            counted(args.parts.len(), "file", "files"),
+            film.ranges_text(),
+            film.passes()
+        );
         if film.ranges().len() > 1 {
             eprintln!("warning: passes are missing between the parts");
         }

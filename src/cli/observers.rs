@@ -8,6 +8,7 @@ use marmor::integrator::KnownLights;
 use marmor::render::{Observer, Progress, Seconds};
 use marmor::report::{ErrorFigures, Record, RecordFile, SelfFigures};
 use marmor::tally::Tally;
+use marmor::words::counted;
 use marmor::{Error, Result};
 use std::cell::{Cell, RefCell};
 use std::io::IsTerminal;
@@ -323,7 +324,12 @@ impl Observer for Records {
 impl Records {
     /// What was not written.
     pub fn failure(self) -> Option<Error> {
-        self.failed.map(|(error, lines)| error.within(format_args!("{lines} lines of the records are missing")))
+        self.failed.map(|(error, lines)| {
+            error.within(format_args!(
+                "{} missing",
+                counted(lines, "line of the records is", "lines of the records are")
+            ))
+        })
     }
 }
 

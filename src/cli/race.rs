@@ -13,6 +13,7 @@ use marmor::query::{self, RayQuery};
 use marmor::render::{Job, Seconds};
 use marmor::report::ErrorPoint;
 use marmor::tally::Tally;
+use marmor::words::counted;
 use marmor::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -290,8 +291,10 @@ pub struct Reference {
 /// Remarks on all renders and their reference, each once: what a report puts first.
 pub fn remarks(runners: &[Runner<'_>], reference: &Reference) -> Vec<String> {
     let not_finite = reference.truth.image.pixels.iter().filter(|p| !p.is_finite()).count();
-    let not_finite =
-        (not_finite > 0).then(|| format!("{not_finite} pixels of the reference are not finite and count nowhere"));
+    let not_finite = (not_finite > 0).then(|| {
+        let pixels = counted(not_finite, "pixel", "pixels");
+        format!("{pixels} of the reference without a finite value, counted nowhere")
+    });
     let mut out: Vec<String> = Vec::new();
     let own = runners.iter().flat_map(Runner::remarks);
     for remark in not_finite.into_iter().chain(reference.remarks.iter().cloned()).chain(own) {
@@ -307,7 +310,7 @@ pub fn stored(path: &Path) -> Result<Reference> {
     let text = path.file_name().map_or("stored picture".into(), |name| name.to_string_lossy().into_owned());
     if Format::of(path).is_ok_and(|format| format == Format::Film) {
         let film = Checkpoint::read(path)?.film;
-        let text = format!("{text}, {} samples", film.passes());
+        let text = format!("{text}, {}", counted(film.passes(), "sample", "samples"));
         let truth = Truth::of_film(&film, &mut SelfError::new());
         return Ok(Reference { text, truth, remarks: Vec::new() });
     }
@@ -340,9 +343,9 @@ pub fn machine() -> String {
     let cpus = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpus.lines().find_map(|l| l.strip_prefix("model name")).and_then(|l| l.split(':').nth(1));
     format!(
-        "{}, {} threads, {} {}",
+        "{}, {}, {} {}",
         model.map_or("unknown processor", str::trim),
-        rayon::current_num_threads(),
+        counted(rayon::current_num_threads(), "thread", "threads"),
         std::env::consts::OS,
         std::env::consts::ARCH
     )

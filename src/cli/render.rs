@@ -15,7 +15,8 @@ use marmor::integrator::{Integrator, Part, View, lost};
 use marmor::query;
 use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
 use marmor::report::RecordFile;
-use marmor::scene::{Scene, SceneFile};
+use marmor::scene::{Object, Scene, SceneFile};
+use marmor::words::counted;
 use marmor::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -143,7 +144,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let earlier = spent.seconds.total();
         if film.passes() > 0 && verbosity > Verbosity::Quiet {
             let path = film_file.path.display();
-            eprintln!("going on from {path} after {} passes and {earlier:.1} s of rendering", film.passes());
+            let passes = counted(film.passes(), "pass", "passes");
+            eprintln!("going on from {path} after {passes} and {earlier:.1} s of rendering");
         }
         let mut task = Task {
             args: &args,
@@ -160,14 +162,15 @@ pub fn run(args: Args) -> Result<ExitCode> {
         if verbosity > Verbosity::Quiet {
             let triangles: usize = scene.objects.iter().map(|o| o.mesh.triangles.len()).sum();
             eprintln!(
-                "{}: {} objects, {triangles} triangles, {}x{} pixels, {} on {}, {} threads",
+                "{}: {}, {}, {}x{} pixels, {} on {}, {}",
                 scene.name,
-                scene.objects.len(),
+                counted(scene.objects.len(), "object", "objects"),
+                counted(triangles, "triangle", "triangles"),
                 resolution[0],
                 resolution[1],
                 prepared.method.name(),
                 task.description,
-                rayon::current_num_threads()
+                counted(rayon::current_num_threads(), "thread", "threads")
             );
         }
         let silent = verbosity == Verbosity::Quiet;
@@ -328,8 +331,8 @@ impl Task<'_> {
         }
         let seconds = outcome.seconds;
         eprintln!(
-            "{} passes in {:.1} s (cache {:.1} s, gather {:.1} s){}, {:.1} s in all{}",
-            film.passes(),
+            "{} in {:.1} s (cache {:.1} s, gather {:.1} s){}, {:.1} s in all{}",
+            counted(film.passes(), "pass", "passes"),
             seconds.total(),
             seconds.cache,
             seconds.gather,
@@ -355,12 +358,14 @@ impl Task<'_> {
                 .map_or(" (interval unknown)".into(), |[low, high]| format!(" (95 %: {low:.4e} to {high:.4e})"));
             eprintln!("against the reference: RMSE {:.4e}{relative}{interval}", e.rmse);
         }
-        // Where a lamp is inside or a mesh has no inside, the warnings before have said why.
-        if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 && scene.obstacles().is_empty() {
+        // Where there is no light, a lamp is inside, or a mesh has no inside or looks inwards, the warnings before have said why.
+        let inside_out = |o: &Object| o.findings.inside_out() || o.findings.zero_area == o.findings.triangles;
+        let told = scene.is_dark() || !scene.obstacles().is_empty() || scene.objects.iter().any(inside_out);
+        if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 && !told {
             eprintln!(
-                "warning: none of {} samples on translucent surfaces met any light: do the lights face them? (a light \
+                "warning: none of {} on translucent surfaces met any light: do the lights face them? (a light \
                  shines along its outward normal; `two_sided = true` lets it shine both ways)",
-                outcome.tally.gather.samples
+                counted(outcome.tally.gather.samples, "sample", "samples")
             );
         }
         let level = if outcome.tally.walk.lost_many() { "warning: " } else { "" };
@@ -390,8 +395,11 @@ pub fn odd_line(film: &Film, spent: &Spent, replay: Option<&str>) -> String {
     let (counts, gather) = (film.counts(), &spent.tally.gather);
     let replay = replay.map_or(String::new(), |line| format!(" (look at one: {line})"));
     format!(
-        "dropped {} non-finite samples and {} cached ones; {} negative; {} values of S_d clamped at 0{replay}",
-        counts.non_finite, gather.non_finite, counts.negative, gather.clamped
+        "dropped {} and {}; {} negative; {} of S_d clamped at 0{replay}",
+        counted(counts.non_finite, "non-finite sample", "non-finite samples"),
+        counted(gather.non_finite, "cached one", "cached ones"),
+        counts.negative,
+        counted(gather.clamped, "value", "values")
     )
 }
 

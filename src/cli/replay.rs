@@ -5,6 +5,7 @@ use marmor::Result;
 use marmor::integrator::View;
 use marmor::render::{self, Job};
 use marmor::sampling::{PixelStream, Turn};
+use marmor::words::counted;
 use std::process::ExitCode;
 
 /// Prints the sample, its ray and the first thing it meets.
@@ -45,8 +46,11 @@ pub fn run(prepared: &Prepared, view: View<'_>, job: &Job<'_>, pixel: [u32; 2], 
     }
     let gather = tally.gather;
     println!(
-        "cache of the pass: {} samples, {} with light, {} left out as not finite; {} values of S_d clamped at this pixel",
-        gather.samples, gather.lit, gather.non_finite, gather.clamped
+        "cache of the pass: {}, {} with light, {} left out as not finite; {} of S_d clamped at this pixel",
+        counted(gather.samples, "sample", "samples"),
+        gather.lit,
+        gather.non_finite,
+        counted(gather.clamped, "value", "values")
     );
     Ok(ExitCode::SUCCESS)
 }

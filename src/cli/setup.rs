@@ -95,7 +95,7 @@ impl Method {
         match self {
             Self::AmbientOcclusion(_) | Self::Direct(_) => 0,
             Self::Subsurface(_) => 40,
-            Self::VolumePath(_) => 90,
+            Self::VolumePath(_) => 75,
         }
     }
 

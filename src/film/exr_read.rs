@@ -6,6 +6,7 @@ use super::exr_layers::{Choice, choose};
 use super::primaries::Primaries;
 use super::{Attribute, FilePicture, Image, Window};
 use crate::math::Rgb;
+use crate::words::counted;
 use crate::{Error, ErrorKind, Result, input, memory};
 use ::exr::image::FlatSamples;
 use exr::prelude as exr;
@@ -70,8 +71,9 @@ pub(super) fn read(path: &Path, layer: Option<&str>) -> Result<FilePicture> {
     let planes = chosen.channels.iter().map(&mut plane).collect::<Result<Vec<_>>>()?;
     if cut_off > 0 {
         remarks.push(format!(
-            "{cut_off} values are {LARGEST_HALF} or infinite, the end of its 16-bit numbers: what was brighter, a sun perhaps, was \
-             cut off when it was saved; save it with 32-bit floats"
+            "{} {LARGEST_HALF} or infinite, the end of its 16-bit numbers: what was brighter, a sun perhaps, was \
+             cut off when it was saved; save it with 32-bit floats",
+            counted(cut_off, "value is", "values are")
         ));
     }
     let conversion = match all.attributes.chromaticities {

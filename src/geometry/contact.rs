@@ -269,39 +269,17 @@ fn overlap(one: &Face, two: &Face, n: DVec3, gap: f64) -> Option<(Kind, DVec3)> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::test_shapes::{self, joined};
     use crate::geometry::{Mesh, ObjMesh, Seams, sphere};
 
     const GAP: f64 = 1e-6;
 
-    /// A box, each face cut into `n` by `n` squares.
     fn cuboid(centre: DVec3, half: DVec3, n: u32) -> ObjMesh {
-        let mut mesh = ObjMesh::default();
-        for axis in 0..3 {
-            let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
-            for (w, u) in [(DVec3::AXES[axis], u), (-DVec3::AXES[axis], -u)] {
-                for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
-                    let base = mesh.positions.len() as u32;
-                    for (a, b) in [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)] {
-                        let at = |k: u32| (2.0 * f64::from(k) - f64::from(n)) / f64::from(n);
-                        mesh.positions.push(centre + half * (w + u * at(a) + v * at(b)));
-                    }
-                    mesh.triangles.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
-                }
-            }
-        }
-        mesh
+        test_shapes::cuboid(centre, half, n, false)
     }
 
     fn cube(x: f64, y: f64, z: f64, n: u32) -> ObjMesh {
         cuboid(DVec3::new(x, y, z), DVec3::splat(1.0), n)
-    }
-
-    fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
-        let base = a.positions.len() as u32;
-        a.positions.extend(&b.positions);
-        a.triangles.extend(b.triangles.iter().map(|t| t.map(|i| base + i)));
-        a.normals = None;
-        a
     }
 
     fn solid(mesh: &ObjMesh) -> Solid {

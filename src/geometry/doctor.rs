@@ -4,6 +4,7 @@
 use super::weld::{Seam, moved_to, seam};
 use super::{Mesh, ObjMesh};
 use crate::math::DVec3;
+use crate::words::counted;
 use rayon::slice::ParallelSliceMut as _;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -109,10 +110,13 @@ impl std::fmt::Display for Mended {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if let Some(seam) = self.welded {
             let Seam { within, share, corners, .. } = seam;
-            write!(f, "{corners} corners welded to others within {within:.1e} units ({share:.0e} of its size), ")?;
+            let corners = counted(corners, "corner", "corners");
+            write!(f, "{corners} welded to others within {within:.1e} units ({share:.0e} of its size), ")?;
         }
         let Self { zero_area, duplicates, turned, .. } = self;
-        write!(f, "{zero_area} triangles without area and {duplicates} repeated ones removed, {turned} turned")
+        let (flat, twice) =
+            (counted(*zero_area, "triangle", "triangles"), counted(*duplicates, "repeated one", "repeated ones"));
+        write!(f, "{flat} without area and {twice} removed, {turned} turned")
     }
 }
 

@@ -17,8 +17,13 @@ mod polygon;
 mod polygon_fill;
 mod shapes;
 mod solid;
+#[cfg(test)]
+mod test_shapes;
 mod weld;
 mod winding;
+
+#[cfg(test)]
+use crate::math::DVec3;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;

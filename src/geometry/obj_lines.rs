@@ -2,6 +2,7 @@
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
 use super::obj_remarks::{CURVED, KNOWN, OddLines};
+use crate::words::either;
 use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
 
@@ -102,7 +103,7 @@ impl<R: BufRead> ObjLines<R> {
 
     /// What a user should hear of who expects the file to be shown as it is.
     pub(super) fn remarks(&self) -> impl Iterator<Item = String> {
-        let unused = if self.has_normals.contains(&true) { 0 } else { self.normals };
+        let unused = (!self.has_normals.contains(&true)).then_some(self.normals);
         self.odd.remarks(self.ignored, unused)
     }
 
@@ -363,7 +364,10 @@ fn out_of_range(name: &str, typed: i64, count: usize) -> String {
     if typed == 0 {
         return format!("{name} number 0 in a face; OBJ counts from 1");
     }
-    format!("{name} number {typed} in a face, but there are {count}; export again, or mend the number")
+    format!(
+        "{name} number {typed} in a face, but there {} {count}; export again, or mend the number",
+        either(count, "is", "are")
+    )
 }
 
 impl<R: BufRead> Read for ObjLines<R> {

@@ -1,6 +1,7 @@
 //! What is odd about the lines and the polygons of an OBJ file, in one sentence for each kind.
 
 use super::polygon::Shape;
+use crate::words::{counted, either};
 
 /// Lines that are read in part or not at all: how many, and the first.
 #[derive(Default)]
@@ -80,34 +81,48 @@ pub(super) const KNOWN: &[&str] = &[
 pub(super) const CURVED: &[&str] = &["curv", "curv2", "surf", "bzp", "bsp", "cdc", "cdp", "res"];
 
 impl OddLines {
-    /// What there is to say; besides, points and lines were `ignored`, and `unused` normals belong to no face.
-    pub(super) fn remarks(&self, ignored: usize, unused: usize) -> impl Iterator<Item = String> {
+    /// What there is to say; besides, points and lines were `ignored`, and `unused` normals belong to no face: `None` where
+    /// some face has normals, and each object tells which of its triangles have none.
+    pub(super) fn remarks(&self, ignored: usize, unused: Option<usize>) -> impl Iterator<Item = String> {
         [
-            (ignored > 0)
-                .then(|| format!("{ignored} points, lines or faces with fewer than three corners are left out")),
+            (ignored > 0).then(|| {
+                let what = counted(
+                    ignored,
+                    "point, line or face with fewer than three corners is",
+                    "points, lines or faces with fewer than three corners are",
+                );
+                format!("{what} left out")
+            }),
             self.curved.say(|n, word, line| {
+                let what = counted(n, "free-form curve or surface is", "free-form curves or surfaces are");
                 format!(
-                    "{n} free-form curves or surfaces are left out (the first, `{word}`, in line {line}): only polygons are \
+                    "{what} left out (the first, `{word}`, in line {line}): only polygons are \
                      read; convert them in the modelling program"
                 )
             }),
             self.unknown.say(|n, word, line| {
-                format!("{n} lines begin with a word that OBJ does not have (the first, `{word}`, in line {line}) and are left out")
+                let (what, are) = (counted(n, "line begins", "lines begin"), either(n, "is", "are"));
+                format!("{what} with a word that OBJ does not have (the first, `{word}`, in line {line}) and {are} left out")
             }),
             self.weighted.say(|n, value, line| {
+                let what = counted(n, "vertex has", "vertices have");
                 format!(
-                    "{n} vertices have a fourth number other than 1 (the first, {value}, in line {line}). It is the weight of \
+                    "{what} a fourth number other than 1 (the first, {value}, in line {line}). It is the weight of \
                      free-form curves and moves no corner of a polygon: vertices were not divided by their fourth number"
                 )
             }),
             self.further.say(|n, further, line| {
-                format!("{n} vertices have further numbers ({further} after x y z in line {line}), which are not read")
+                let what = counted(n, "vertex has", "vertices have");
+                format!("{what} further numbers ({further} after x y z in line {line}), which are not read")
             }),
-            self.half_shaded.say(|n, (), line| {
-                format!("{n} faces have normals at some corners only (the first in line {line}) and are shaded flat")
-            }),
-            (unused > 0 && self.half_shaded.count == 0)
-                .then(|| format!("no face refers to any of its {unused} normals: it is shaded flat; set `normals`")),
+            unused.and(self.half_shaded.say(|n, (), line| {
+                let (what, are) = (counted(n, "face has", "faces have"), either(n, "is", "are"));
+                format!("{what} normals at some corners only (the first in line {line}) and {are} shaded flat")
+            })),
+            unused
+                .filter(|&n| n > 0 && self.half_shaded.count == 0)
+                .map(|n| if n == 1 { "its one normal".into() } else { format!("any of its {n} normals") })
+                .map(|which| format!("no face refers to {which}: it is shaded flat; set `normals`")),
         ]
         .into_iter()
         .flatten()
@@ -149,19 +164,22 @@ impl OddPolygons {
 
     /// What there is to say.
     pub(super) fn remarks(&self) -> impl Iterator<Item = String> {
-        let (all, remedy) = (self.polygons, "cut them into triangles in the modelling program");
+        let (all, remedy) =
+            (counted(self.polygons, "polygon", "polygons"), "cut them into triangles in the modelling program");
         let crossing = (self.crossing > 0).then(|| {
             let (n, line) = (self.crossing, self.first_crossing);
+            let (cross, are) = (either(n, "crosses or covers itself", "cross or cover themselves"), either(n, "is", "are"));
+            let they_wind = either(n, "it winds", "they wind");
             format!(
-                "{n} of {all} polygons cross or cover themselves (the first in line {line}) and are filled wherever they wind \
-                 round a point; {remedy}"
+                "{n} of {all} {cross} (the first in line {line}) and {are} filled wherever {they_wind} round a point; {remedy}"
             )
         });
         let bent = (self.bent > 0).then(|| {
             let (n, (off, line)) = (self.bent, self.most_bent);
             format!(
-                "{n} of {all} polygons are not plane (corners up to {off:.2} of the polygon's size off its plane, in line {line}): \
-                 the surface between their corners is a guess; {remedy}"
+                "{n} of {all} {} not plane (corners up to {off:.2} of the polygon's size off its plane, in line {line}): \
+                 the surface between their corners is a guess; {remedy}",
+                either(n, "is", "are")
             )
         });
         crossing.into_iter().chain(bent)

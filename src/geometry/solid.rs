@@ -94,13 +94,16 @@ impl Solid {
                 (morton_code(((a + b + c) / 3.0).clamp(lo, hi), lo, hi), t)
             })
             .collect();
+        drop(keys);
         order.par_sort_unstable();
         let face = |&(_, t): &(u64, u32)| {
             let v = mesh.triangles[t as usize];
             Face { corners: v.map(point), places: v.map(|v| places[v as usize]), part: 0 }
         };
         let mut faces: Vec<Face> = order.iter().map(face).collect();
-        let mut edges: Vec<(u64, u32)> = (0_u32..).zip(&faces).flat_map(|(i, f)| keyed(f.places, i)).collect();
+        drop(order);
+        let mut edges: Vec<(u64, u32)> = Vec::with_capacity(3 * faces.len());
+        edges.extend((0_u32..).zip(&faces).flat_map(|(i, f)| keyed(f.places, i)));
         edges.par_sort_unstable();
         let parts = label(&mut faces, &edges);
         let tree = BoxTree::new(faces.len(), |i| bounds(&faces[i].corners));

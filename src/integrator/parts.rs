@@ -2,6 +2,7 @@
 
 use crate::cache::{CachedSample, PLAIN_SUM, Plan};
 use crate::scene::{Estimator, Scene};
+use crate::words::{counted, short};
 
 /// A part of a method that a scene may or may not need.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -38,8 +39,9 @@ impl Part {
 /// Of the cache of the object called `name`.
 pub(super) fn of_cache(plan: &Plan, name: &str, estimator: Estimator) -> Vec<Part> {
     let megabytes = plan.samples as usize as f64 * size_of::<CachedSample>() as f64 / 1e6;
-    let (samples, triangles) = (plan.samples, plan.body.table.len());
-    let cache = format!("{samples} samples a pass ({megabytes:.1} MB), {triangles} triangles");
+    let samples = counted(plan.samples, "sample", "samples");
+    let triangles = counted(plan.body.table.len(), "triangle", "triangles");
+    let cache = format!("{samples} a pass ({megabytes:.1} MB), {triangles}");
     let colour = format!("colour of `{name}`");
     vec![
         Part::built(format!("sample cache of `{name}`"), cache),
@@ -68,9 +70,9 @@ fn near_field(plan: &Plan, name: &str, estimator: Estimator) -> Part {
     let part = format!("near field of `{name}`");
     match (&plan.near, estimator) {
         (Some(near), _) => {
-            let (radius, samples) = (near.radius(), plan.samples);
-            let why =
-                format!("light within {radius:.3} is sampled for each exit, {samples} samples serve for the rest");
+            let radius = short(near.radius().into());
+            let samples = counted(plan.samples, "sample serves", "samples serve");
+            let why = format!("light within {radius} units is sampled for each exit, {samples} for the rest");
             Part::built(part, why)
         }
         (None, Estimator::Notes | Estimator::Thinned) => {

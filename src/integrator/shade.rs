@@ -7,6 +7,7 @@ use crate::math::Rgb;
 use crate::sampling::PixelStream;
 use crate::scene::Scene;
 use crate::tally::Tally;
+use crate::words::counted;
 use std::f32::consts::FRAC_1_PI;
 
 /// Direct light on diffuse surfaces.
@@ -63,7 +64,10 @@ impl DirectLight {
     pub fn parts(&self, _: &Scene) -> Vec<Part> {
         let table = if self.lights.has_emitters() {
             let (n, t) = (self.lights.emitters(), self.lights.triangles());
-            Part::built("light table", format!("{t} emitting triangles of {n} meshes, picked by power and area"))
+            Part::built("light table", {
+                let (t, n) = (counted(t, "emitting triangle", "emitting triangles"), counted(n, "mesh", "meshes"));
+                format!("{t} of {n}, picked by power and area")
+            })
         } else {
             Part::left_out("light table", "no emissive surface with area")
         };

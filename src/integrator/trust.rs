@@ -5,7 +5,7 @@ use super::local::{Candidate, Local, LocalShape};
 use crate::bssrdf::{ExpectedError, ModelName, Place, Unmeasured, expected_error};
 use crate::geometry::Mesh;
 use crate::optics::FresnelMoments;
-use crate::scene::{ObstacleKind, Scene, Surface, Translucent};
+use crate::scene::{ObstacleKind, Surface, Translucent};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -53,6 +53,8 @@ pub enum Verdict {
     TooThin,
     /// No model is within the tolerance, whatever the thickness.
     Nowhere,
+    /// Triangles that do not share their corners, which lie close together: no model has an inside before they are welded.
+    Unwelded,
     /// A sheet without thickness, or one whose holes are most of it: no model has an inside to work on.
     Open,
     /// Its faces look inwards: nothing can be said before they are turned.
@@ -148,7 +150,8 @@ impl Trustworthiness {
         let normalised = own.model.normalises_exit(material.exit_normalisation);
         let verdict = match models[0].1.beyond {
             _ if object.findings.inside_out() => Verdict::InsideOut,
-            _ if open > MOSTLY || is_sheet(view.scene, &object.name) => Verdict::Open,
+            _ if view.scene.has(object, ObstacleKind::Unwelded) => Verdict::Unwelded,
+            _ if open > MOSTLY || view.scene.has(object, ObstacleKind::Sheet) => Verdict::Open,
             None => Verdict::NotMeasured,
             Some(beyond) if beyond < 0.005 => Verdict::Trust,
             Some(beyond) if beyond < MOSTLY => Verdict::WhereThick,
@@ -211,11 +214,6 @@ fn as_slab(closed: &[Local], all: usize) -> Option<Candidate> {
     let flat = |l: &&Local| (l.thickness - middle).abs() < 0.05 * middle && l.curvature.abs() * middle < 0.2;
     let share = closed.iter().filter(flat).count() as f64 / all as f64;
     (share > NEARLY_ALL).then_some(Candidate { model: ModelName::SLAB, calibrated: false, thickness: Some(middle) })
-}
-
-/// Whether it has been found to have no inside.
-fn is_sheet(scene: &Scene, name: &str) -> bool {
-    scene.obstacles().iter().any(|o| o.kind == ObstacleKind::Sheet && o.objects.iter().any(|n| n == name))
 }
 
 /// Whether the program makes this model of the material.

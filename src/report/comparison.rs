@@ -6,6 +6,7 @@ use super::page::{Page, Picture};
 use super::verdict::{listed, why_not};
 use crate::film::metrics::Estimate;
 use crate::film::{Bias, Brightness, Judgement};
+use crate::words::counted;
 use serde::Serialize;
 use std::fmt::Write as _;
 
@@ -162,13 +163,20 @@ impl ModelComparison {
         let pixels = |part| self.models.first().and_then(|m| m.figures(part)).map_or(0, |f| f.pixels);
         let [translucent, mixed, background] = [Part::Translucent, Part::Mixed, Part::Background].map(pixels);
         let judged = match part {
-            Part::Translucent => format!("Judged by the {translucent} pixels that are translucent objects alone"),
+            Part::Translucent => match translucent {
+                1 => "Judged by the one pixel that is a translucent object alone".into(),
+                n => format!("Judged by the {n} pixels that are translucent objects alone"),
+            },
             Part::Mixed => {
-                format!("Judged by the {mixed} pixels that are in part translucent objects; none is that alone")
+                let pixels = counted(mixed, "pixel that is", "pixels that are");
+                format!("Judged by the {pixels} in part translucent objects; none is that alone")
             }
             _ => "Judged by all pixels: no translucent object is in view".into(),
         };
-        format!("{judged}; apart from them {mixed} mixed pixels at silhouettes and {background} of background.")
+        format!(
+            "{judged}; apart from them {} at silhouettes and {background} of background.",
+            counted(mixed, "mixed pixel", "mixed pixels")
+        )
     }
 
     fn model_text(&self, model: &Compared, bias: &Bias, part: Part) -> String {

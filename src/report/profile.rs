@@ -7,6 +7,7 @@ use super::plot::{COLOURS, DASHES, Figure, Panel, Row, Series, Stroke};
 use crate::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit, SingleChannel};
 use crate::math::{DVec3, Vec3};
 use crate::optics::{ChannelOptics, FresnelMoments, HalfSpace, Measured, Medium};
+use crate::words::{albedo, digits};
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
@@ -124,14 +125,14 @@ impl Profile {
             let name = self.channel_name(c);
             let _ = writeln!(
                 out,
-                "# {name}: reduced albedo {:.6}, transport mean free path {} {unit}, diffusion length {} {unit}",
-                k.alpha_prime,
+                "# {name}: reduced albedo {}, transport mean free path {} {unit}, diffusion length {} {unit}",
+                digits(k.alpha_prime, 8),
                 short(k.transport_mean_free_path),
                 short(k.diffusion_length)
             );
-            let _ = writeln!(out, "# total,transfer equation,{name},{:.6}", self.reference_total(c));
+            let _ = writeln!(out, "# total,transfer equation,{name},{}", digits(self.reference_total(c), 6));
             for curve in &self.curves {
-                let _ = writeln!(out, "# total,{},{name},{:.6}", curve.name, curve.total[c]);
+                let _ = writeln!(out, "# total,{},{name},{}", curve.name, digits(curve.total[c].into(), 6));
             }
         }
         out.push_str("curve,channel,r,exitance,standard_error\n");
@@ -211,9 +212,9 @@ impl Profile {
         let length =
             |value: f64| if value.is_finite() { format!("{} {}", short(value), self.unit) } else { "∞".into() };
         format!(
-            "{}: α′ = {:.4}, ℓ′ = {}, 1/σₜᵣ = {}",
+            "{}: α′ = {}, ℓ′ = {}, 1/σₜᵣ = {}",
             self.channel_name(c),
-            k.alpha_prime,
+            albedo(k.alpha_prime),
             length(k.transport_mean_free_path),
             length(k.diffusion_length)
         )
@@ -222,10 +223,10 @@ impl Profile {
     fn total_notes(&self, c: usize) -> Vec<String> {
         let mut notes = vec!["total reflectance".to_owned()];
         match self.runs[c] {
-            Some(run) => notes.push(format!("  Monte Carlo {:.4}", run.reflectance)),
-            None => notes.push(format!("  transfer equation {:.4}", self.reference_total(c))),
+            Some(run) => notes.push(format!("  Monte Carlo {}", albedo(run.reflectance))),
+            None => notes.push(format!("  transfer equation {}", albedo(self.reference_total(c)))),
         }
-        notes.extend(self.curves.iter().map(|curve| format!("  {} {:.4}", curve.name, curve.total[c])));
+        notes.extend(self.curves.iter().map(|curve| format!("  {} {}", curve.name, albedo(curve.total[c].into()))));
         notes
     }
 

@@ -2,6 +2,7 @@
 
 use super::{Object, Surface};
 use crate::geometry::Seam;
+use crate::words::{counted, either, short};
 
 /// A finding about an object's mesh, in words.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -19,32 +20,35 @@ pub(super) const COARSE: f64 = 1e-4;
 pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
     let (found, mut remarks) = (&object.findings, Vec::new());
     let mut say = |warns: bool, text: String| remarks.push(Remark { text, warns });
-    let all = found.triangles;
+    let all = counted(found.triangles, "triangle", "triangles");
     let translucent = matches!(surface, Surface::Translucent(_));
     let emissive = matches!(surface, Surface::Emissive { .. });
     let one_sided = translucent || matches!(surface, Surface::Emissive { two_sided: false, .. });
-    if emissive && found.zero_area == all {
-        say(true, format!("all {all} triangles have no area: it sends out no light"));
+    if emissive && found.zero_area == found.triangles {
+        let have = if found.triangles == 1 { "its one triangle has".into() } else { format!("all {all} have") };
+        say(true, format!("{have} no area: it sends out no light"));
     } else if found.zero_area > 0 {
-        say(true, format!("{} of {all} triangles have no area; rays and samples pass them by", found.zero_area));
+        let n = found.zero_area;
+        let (have, them) = (either(n, "has", "have"), either(n, "it", "them"));
+        say(true, format!("{n} of {all} {have} no area; rays and samples pass {them} by"));
     }
     if found.duplicates > 0 {
         let n = found.duplicates;
         let (warns, effect) = match (translucent, emissive) {
-            (true, _) => (true, "the light that enters there counts twice; --repair removes them"),
-            (_, true) => (true, "the light they send counts twice; --repair removes them"),
-            _ => (false, "harmless: rays meet one of them"),
+            (true, _) => (true, "the light that enters there counts twice; --repair removes what is there twice"),
+            (_, true) => (true, "the light sent from there counts twice; --repair removes what is there twice"),
+            _ => (false, "harmless: rays meet the one or the other"),
         };
-        say(warns, format!("{n} of {all} triangles repeat another: {effect}"));
+        say(warns, format!("{n} of {all} {} another: {effect}", either(n, "repeats", "repeat")));
     }
     if found.mixed_edges > 0 {
-        let n = found.mixed_edges;
+        let n = counted(found.mixed_edges, "edge", "edges");
         let effect = if one_sided {
             "some faces look the wrong way and stay dark; --repair turns them"
         } else {
             "some faces look the wrong way: harmless, both sides are alike"
         };
-        say(one_sided, format!("faces disagree about the outside along {n} edges: {effect}"));
+        say(one_sided, format!("faces disagree about the outside along {n}: {effect}"));
     }
     if let Some(volume) = found.volume.filter(|_| found.inside_out()) {
         let effect = match (translucent, one_sided) {
@@ -52,7 +56,7 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
             (_, true) => "it shines inwards; set flip = true, or --repair turns it",
             _ => "harmless, both sides are alike",
         };
-        say(one_sided, format!("its faces look inwards (volume {volume:.4e} unit³): {effect}"));
+        say(one_sided, format!("its faces look inwards (volume {} unit³): {effect}", short(volume)));
     }
     if let Some(seam) = found.seam {
         let Seam { within, share, corners, closed } = seam;
@@ -60,9 +64,13 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
         say(
             translucent,
             format!(
-                "{closed} of {} edges that belong to one triangle alone run along another such edge within {within:.1e} units \
-                 ({share:.0e} of its size): {corners} corners that should be one with others are not, {effect}; --repair welds them",
-                found.open_edges
+                "{closed} of {} to one triangle alone {} along another such edge within {within:.1e} units ({share:.0e} of \
+                 its size): {} one with others {} not, {effect}; --repair welds {}",
+                counted(found.open_edges, "edge that belongs", "edges that belong"),
+                either(closed, "runs", "run"),
+                counted(corners, "corner that should be", "corners that should be"),
+                either(corners, "is", "are"),
+                either(corners, "it", "them")
             ),
         );
     }
@@ -72,8 +80,9 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
         say(
             true,
             format!(
-                "{holes} edges belong to one triangle alone, the rims of holes: the surface is rendered as it is, as if the \
-                 medium ended at the rim; close the holes for a solid body"
+                "{} to one triangle alone, the rims of holes: the surface is rendered as it is, as if the medium ended at \
+                 the rim, and paths of `volume_path` that come there are lost and counted; close the holes for a solid body",
+                counted(holes, "edge belongs", "edges belong")
             ),
         );
     }
@@ -81,8 +90,8 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
         say(
             false,
             format!(
-                "{} edges belong to more than two triangles: harmless to surfaces; what is inside is not defined there",
-                found.non_manifold_edges
+                "{} to more than two triangles: harmless to surfaces; what is inside is not defined there",
+                counted(found.non_manifold_edges, "edge belongs", "edges belong")
             ),
         );
     }
@@ -93,8 +102,10 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
             say(
                 true,
                 format!(
-                    "it is {size:.4e} units large and {farthest:.4e} units from the middle of the scene: even double \
-                     precision puts its vertices on steps of {step:.1e} units; bring it nearer"
+                    "it is {} units large and {} units from the middle of the scene: even double \
+                     precision puts its vertices on steps of {step:.1e} units; bring it nearer",
+                    short(size),
+                    short(farthest)
                 ),
             );
         }

@@ -5,6 +5,7 @@ use super::{Object, Translucent};
 use crate::bssrdf::{Bssrdf, Place, SingleScattering, expected_error};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, Medium};
+use crate::words::{digits, percent, short};
 
 /// Excess of light that is said. On a plane, models of a half space err by up to 0.12 themselves (`beam` at η = 1).
 const EXCESS: f64 = 0.15;
@@ -90,15 +91,16 @@ fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Un
     let thickness = shape.thickness;
     let path = each().map(|(_, k)| k.transport_mean_free_path).fold(0.0, f64::max);
     let head = format!(
-        "`{}` is a model of a half space, and the body is some {thickness:.4} units thick, {:.2} transport mean free paths",
+        "`{}` is a model of a half space, and the body is some {} units thick, {} transport mean free paths",
         model.name().name(),
-        thickness / path
+        short(thickness),
+        digits(thickness / path, 3)
     );
     // Worse than the same medium in a body without end.
     let brighter = largest(&t.medium, each().filter(|(_, k)| factor(k) > plane(k)).map(|(c, k)| (c, factor(k))));
     if let Some((channel, factor)) = brighter.filter(|(_, factor)| *factor > 1.0 + EXCESS) {
         let slab = (thickness > SLAB_FROM * path)
-            .then(|| format!("take model `slab` with thickness = {thickness:.4} if it is flat"));
+            .then(|| format!("take model `slab` with thickness = {} if it is flat", short(thickness)));
         let measured = each().all(|(_, k)| place(k) == place(k).nearest_measured());
         let (about, like) = if measured {
             ("up to", "")
@@ -113,8 +115,8 @@ fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Un
     let (channel, error) = largest(&t.medium, each().map(|(c, k)| (c, here(k).distribution)))?;
     (thickness < path).then(|| {
         format!(
-            "{head}: {:.0} % of the light or more comes out in the wrong places{channel}; {}",
-            100.0 * error,
+            "{head}: {} of the light or more comes out in the wrong places{channel}; {}",
+            percent(error),
             remedy(None, untraceable)
         )
     })
@@ -154,9 +156,10 @@ fn other_slab(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &
     let ratio = told / shape.thickness;
     (!(1.0 / OTHER_SLAB..=OTHER_SLAB).contains(&ratio)).then(|| {
         format!(
-            "`slab` is told a thickness of {told:.4} units, and the body is some {:.4} units thick: what it reflects and lets \
+            "`slab` is told a thickness of {} units, and the body is some {} units thick: what it reflects and lets \
              through is that of another sheet; {}",
-            shape.thickness,
+            short(told),
+            short(shape.thickness),
             remedy(Some("set `thickness`".into()), untraceable)
         )
     })
@@ -224,10 +227,7 @@ mod tests {
         for model in [ModelName::STANDARD, ModelName::BETTER, ModelName::BEAM, ModelName::NORMALISED, ModelName::AUTO] {
             assert_eq!(super::of(&of(model), &thick, &|| None), Vec::<String>::new(), "{model:?}");
             let said = super::of(&of(model), &thin, &|| None).join("\n");
-            assert!(
-                said.contains("model of a half space") && said.contains("0.80 transport mean free paths"),
-                "{said}"
-            );
+            assert!(said.contains("model of a half space") && said.contains("0.8 transport mean free paths"), "{said}");
             assert!(said.ends_with("take method `volume_path`"), "{said}");
             let crossed = super::of(&of(model), &thin, &|| Some("it passes through itself".into())).join("\n");
             assert!(crossed.ends_with("`volume_path` cannot trace it: it passes through itself"));

@@ -8,6 +8,7 @@ use super::tree::Fields;
 use crate::error::{Error, Result};
 use crate::film::{FilePicture, Image};
 use crate::math::Rgb;
+use crate::words::{counted, either};
 
 /// `[environment]`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -104,9 +105,10 @@ impl EnvironmentEntry {
         let dropped = negative + nan + infinite;
         if dropped > 0 {
             said.push(format!(
-                "{}: {dropped} values are negative or not finite ({negative} negative, {nan} not a number, {infinite} infinite) and \
-                 count as 0",
-                path.display()
+                "{}: {} negative or not finite ({negative} negative, {nan} not a number, {infinite} infinite) and {} as 0",
+                path.display(),
+                counted(dropped, "value is", "values are"),
+                either(dropped, "counts", "count")
             ));
         }
         Ok(Environment { radiance: self.radiance, image: Some(Arc::new(image)), turn })

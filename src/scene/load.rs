@@ -2,16 +2,18 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use super::file::{FovAxis, SceneFile, unit_vector};
 use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
-use super::{Camera, Insides, Material, Object, Scene, Surface, Translucent, precision, warnings};
+use super::{Camera, Insides, Material, Object, ObstacleKind, Scene, Surface, Translucent, precision, warnings};
 use crate::error::{Error, Result};
-use crate::geometry::{LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere};
+use crate::geometry::{
+    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere,
+};
 use crate::math::{DVec3, Vec3};
 use crate::memory;
+use crate::words::{counted, either};
 
 impl Scene {
     /// Reads the meshes of a scene file (each OBJ once) and makes the world from them. What is odd but can be
@@ -39,12 +41,16 @@ impl Scene {
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
         let mut objects = Vec::with_capacity(placed.len());
         for (entry, mesh) in file.objects.iter().zip(placed) {
-            let mesh = mesh.recentred(centre);
+            let alone = if entry.normals == NormalsChoice::Smooth { mesh.sharing_no_corner() } else { 0 };
+            let as_placed = mesh;
+            let mesh = as_placed.recentred(centre);
+            drop(as_placed);
             if let Some(p) = mesh.positions.iter().find(|p| !p.as_vec3().is_finite()) {
                 let what = format!("object {:?}: a vertex ({p}) is too far out for single precision", entry.name);
                 return Err(Error::scene(format!("{}: {what}; use a larger `unit` or a smaller `scale`", entry.at)));
             }
             let findings = examine(&mesh);
+            said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
             let (name, at) = (entry.name.clone(), entry.at.clone());
             objects.push(Object { name, mesh, at, material: entry.material, findings });
         }
@@ -70,12 +76,16 @@ impl Scene {
         scene.why_double = choice.why_double;
         // From here on: the gap between two surfaces depends on what rays are traced in.
         said.extend(warnings::of(file, &scene));
+        let method = file.method.name.unwrap_or_else(|| scene.default_method());
+        let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath);
         for (number, what) in choice.beyond {
             let entry = &file.objects[number];
-            said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
+            // What encloses nothing is not too thin besides.
+            if !models_or_paths || !scene.has(&scene.objects[number], ObstacleKind::Sheet) {
+                said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
+            }
         }
-        let method = file.method.name.unwrap_or_else(|| scene.default_method());
-        if matches!(method, MethodName::Subsurface | MethodName::VolumePath) {
+        if models_or_paths {
             said.extend(scene.obstacles().iter().filter_map(|o| o.warning(method)));
         }
         scene.warnings = said;
@@ -103,7 +113,13 @@ impl Scene {
 
 /// The objects' meshes in the scene's space, in f64.
 fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
-    let mut read: HashMap<PathBuf, Rc<ObjMesh>> = HashMap::new();
+    let mut read: HashMap<PathBuf, ObjMesh> = HashMap::new();
+    let path_of = |entry: &ObjectEntry| match &entry.geometry {
+        Geometry::Mesh(path) => Some(folder.join(path)),
+        _ => None,
+    };
+    let mut uses: HashMap<PathBuf, usize> = HashMap::new();
+    file.objects.iter().filter_map(path_of).for_each(|path| *uses.entry(path).or_default() += 1);
     let mut out = Vec::with_capacity(file.objects.len());
     let mut unasked = 0;
     for entry in &file.objects {
@@ -122,17 +138,17 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
             }
             Geometry::Mesh(path) => {
                 let path = folder.join(path);
-                let mesh = match read.get(&path) {
-                    Some(mesh) => Rc::clone(mesh),
-                    None => {
-                        let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
-                        let mesh = Rc::new(load_obj(&path).map_err(within)?);
-                        said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
-                        read.insert(path, Rc::clone(&mesh));
-                        mesh
-                    }
-                };
-                mesh.as_ref().clone()
+                if !read.contains_key(&path) {
+                    let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
+                    let mesh = load_obj(&path).map_err(within)?;
+                    said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
+                    read.insert(path.clone(), mesh);
+                }
+                let left = uses.entry(path.clone()).or_default();
+                *left = left.saturating_sub(1);
+                // The last one takes it: a large mesh is not there twice.
+                let mesh = if *left == 0 { read.remove(&path) } else { read.get(&path).cloned() };
+                mesh.unwrap_or_default()
             }
         };
         out.push(place(entry, mesh, repair, said));
@@ -147,8 +163,11 @@ fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<St
     let (bare, all) = (mesh.without_normals(), mesh.triangles.len());
     if bare > 0 {
         said.push(format!(
-            "{}: object {:?}: {bare} of {all} triangles have no normals in the file and are shaded flat; set `normals`",
-            entry.at, entry.name
+            "{}: object {:?}: {bare} of {} {} shaded flat, without normals in the file or not at each corner; set `normals`",
+            entry.at,
+            entry.name,
+            counted(all, "triangle", "triangles"),
+            either(bare, "is", "are")
         ));
     }
     mesh = mesh.placed(entry.transform.linear, entry.transform.translate);
@@ -166,15 +185,24 @@ fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<St
     if entry.normals != NormalsChoice::Smooth {
         return mesh;
     }
-    let (alone, all) = (mesh.sharing_no_corner(), mesh.triangles.len());
-    if all > 1 && 2 * alone > all {
-        said.push(format!(
-            "{}: object {:?}: normals = \"smooth\" smooths nothing on {alone} of {all} triangles, which share no corner with \
-             another, so they are shaded flat; weld corners that should be one: --repair does where they lie close together",
-            entry.at, entry.name
-        ));
-    }
     mesh.with_smooth_normals()
+}
+
+/// That smooth normals were asked for, and `alone` triangles share no corner with another; where a remark on the mesh has the
+/// cause and the remedy, nothing.
+fn smooths_nothing(entry: &ObjectEntry, alone: usize, found: &Findings, translucent: bool) -> Option<String> {
+    if 2 * alone <= found.triangles || found.triangles == 1 || translucent && found.seam.is_some() {
+        return None;
+    }
+    let remedy = match found.seam {
+        Some(_) => "weld them: --repair does",
+        None => "weld corners that should be one",
+    };
+    Some(format!(
+        "{}: object {:?}: normals = \"smooth\" smooths nothing on {alone} of {} triangles, which share no corner with another, so \
+         they are shaded flat; {remedy}",
+        entry.at, entry.name, found.triangles
+    ))
 }
 
 /// Middle of the box around all meshes; halved before it is added, so that it cannot overflow.

@@ -12,6 +12,7 @@ mod file;
 mod load;
 mod materials;
 mod objects;
+mod obstacle;
 mod obstacles;
 mod options;
 mod precision;
@@ -28,7 +29,8 @@ pub use environment::{Environment, EnvironmentEntry};
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
-pub use obstacles::{Insides, Obstacle, ObstacleKind};
+pub use obstacle::{Obstacle, ObstacleKind};
+pub use obstacles::Insides;
 pub use options::{
     EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
 };

@@ -1,10 +1,10 @@
 //! What stands in the way of knowing which medium is where: bodies in one another, surfaces that touch, meshes without an inside, lamps
-//! and cameras in media. Read first: [`Obstacle`]; docs/robustness.md has the table.
+//! and cameras in media. Read first: [`Obstacle`] and [`Found::new`]; docs/robustness.md has the table.
 
-use super::options::MethodName;
-use super::{Object, Scene, Surface};
-use crate::geometry::{Contact, Part, Seek, Solid, meeting};
+use super::{Object, Obstacle, ObstacleKind, Scene, Surface};
+use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, meeting, mended};
 use crate::math::DVec3;
+use crate::words::{self, counted, either, percent};
 use std::sync::OnceLock;
 
 /// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
@@ -18,110 +18,6 @@ const MINOR: f64 = 1e-3;
 const LEAST: f64 = 1e-4;
 /// A mesh of which more than this share is holes has no inside.
 const MOSTLY_HOLES: f64 = 0.05;
-
-/// Kinds of obstacles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ObstacleKind {
-    /// Two media at one place: surfaces pass through each other.
-    Crossing,
-    /// Two media at one place: one inside the other.
-    Nested,
-    /// Surfaces that lie in each other over an area.
-    Touching,
-    /// A surface without an inside.
-    Sheet,
-    /// A mesh with holes.
-    Holes,
-    /// Little of a surface passes through itself or lies inside.
-    Blemish,
-    /// Faces that disagree about where inside is, or repeat others.
-    Faces,
-    /// Parts whose faces look inwards.
-    Turned,
-    /// Faces inside a body, between parts that share their edges.
-    Walls,
-    /// A lamp inside a body, wholly or partly.
-    LampInside,
-    /// A lamp in a face of a body.
-    LampTouching,
-    /// An opaque surface in a face of a body.
-    OpaqueTouching,
-    /// The camera inside a body.
-    CameraInside,
-    /// The camera in the surface of a body.
-    CameraTouching,
-    /// Too many faces in one place to look at.
-    Unknown,
-}
-
-/// Something that a method may not be able to render, with its names, numbers and the remedy.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Obstacle {
-    /// Which kind.
-    pub kind: ObstacleKind,
-    /// Names of the objects, bodies first.
-    pub objects: Vec<String>,
-    /// Where it stands in the scene file.
-    pub at: String,
-    /// What was found.
-    pub what: String,
-    /// What can be done.
-    pub remedy: String,
-    /// Whether a remark on the mesh says it already.
-    said: bool,
-}
-
-impl Obstacle {
-    /// Whether `volume_path` refuses the scene for it, and why.
-    pub fn refusal(&self) -> Option<String> {
-        use ObstacleKind::*;
-        let why = match self.kind {
-            Crossing | Nested => "`volume_path` knows one medium at a place",
-            Touching => "`volume_path` cannot tell which medium comes first",
-            Sheet | Faces | Walls | Turned => "`volume_path` needs an inside",
-            LampTouching | CameraTouching => "`volume_path` cannot tell whether that is inside",
-            Holes | Blemish | LampInside | OpaqueTouching | CameraInside | Unknown => return None,
-        };
-        Some(self.sentence(why))
-    }
-
-    /// What `method` gets wrong for it, if it renders all the same and no other warning says so.
-    pub fn warning(&self, method: MethodName) -> Option<String> {
-        use ObstacleKind::*;
-        let effect = match (method, self.kind) {
-            (MethodName::AmbientOcclusion | MethodName::Direct, _) => return None,
-            (_, OpaqueTouching) => "light may pass there from one side to the other",
-            (_, Unknown) => "what is inside is not known there",
-            (MethodName::VolumePath, Holes | Blemish) => "paths that come there are lost, and counted",
-            (MethodName::VolumePath, _) | (_, Holes | Blemish) => return None,
-            _ if self.said => return None,
-            (_, Crossing | Nested) => {
-                "`subsurface` lights each surface by itself: what lies inside takes no light, and light does not pass from one to the \
-                 other"
-            }
-            (_, Touching) => {
-                "`subsurface` lets no light pass between them, and the faces that touch stay dark or not by chance"
-            }
-            (_, Sheet) => {
-                "`subsurface` takes it for the skin of a thick body: what enters on one side does not leave on the other"
-            }
-            (_, Faces | Walls | Turned) => "`subsurface` lights each face as if the outside were before it",
-            (_, LampInside) => {
-                "`subsurface` takes light from outside alone, as if that lamp were off; take --method volume_path"
-            }
-            (_, LampTouching) => "whether its light enters there is left to rounding",
-            (_, CameraInside) => "`subsurface` shows bodies from outside alone: black; take --method volume_path",
-            (_, CameraTouching) => "whether it is inside is left to rounding",
-        };
-        Some(self.sentence(effect))
-    }
-
-    fn sentence(&self, why: &str) -> String {
-        let remedy = if self.remedy.is_empty() { String::new() } else { format!("; {}", self.remedy) };
-        format!("{}: {}: {why}{remedy}", self.at, self.what)
-    }
-}
 
 /// What is inside what in a scene, once somebody has asked; see [`Scene::obstacles`].
 #[derive(Debug, Default)]
@@ -251,10 +147,10 @@ fn gap(share: f64, a: &(DVec3, DVec3), b: &(DVec3, DVec3)) -> f64 {
     share * [a.0, a.1, b.0, b.1].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
 }
 
-/// A place in the file's coordinates.
-fn near(scene: &Scene, contact: &Contact) -> String {
-    let p = contact.at + scene.centre;
-    format!("near [{:.4}, {:.4}, {:.4}]", p.x, p.y, p.z)
+/// A place in the file's coordinates; `gap` is what counts as one place.
+fn near(scene: &Scene, contact: &Contact, gap: f64) -> String {
+    let least = gap.max(LEAST_GAP * scene.centre.abs().max_element());
+    format!("near {}", words::place((contact.at + scene.centre).to_array(), least))
 }
 
 /// What is wrong with one medium's mesh by itself; whether it has an inside.
@@ -268,7 +164,7 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
             at: body.object.at.clone(),
             // A remark on the mesh says the same.
             said: match kind {
-                ObstacleKind::Faces => true,
+                ObstacleKind::Faces | ObstacleKind::Holes | ObstacleKind::Unwelded => true,
                 ObstacleKind::Turned => body.object.findings.inside_out(),
                 _ => false,
             },
@@ -280,6 +176,13 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
     if area == 0.0 {
         return false;
     }
+    if body.object.findings.seam.is_some() && solid.seams.hole_share > MOSTLY_HOLES {
+        let edges = counted(solid.seams.open, "edge belongs", "edges belong");
+        let what = format!("its triangles do not share their corners, which lie close together ({edges} to one alone)");
+        say(ObstacleKind::Unwelded, what, "--repair welds them");
+        seams(&Solid::new(&welded(&body.object.mesh)), gap, &mut say);
+        return false;
+    }
     seams(solid, gap, &mut say);
     if !solid.is_convex(gap) {
         meets_itself(scene, solid, gap, &mut say);
@@ -287,31 +190,40 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
     solid.seams.hole_share <= MOSTLY_HOLES
 }
 
+/// The mesh as --repair would have it.
+fn welded(mesh: &Mesh) -> Mesh {
+    let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
+    mended(ObjMesh { positions, triangles, ..ObjMesh::default() }).0.recentred(DVec3::ZERO)
+}
+
 /// Edges that leave open what is inside.
 fn seams(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
     let seams = &solid.seams;
     if seams.repeated > 0 {
-        say(ObstacleKind::Faces, format!("{} triangles repeat another", seams.repeated), "--repair removes them");
+        let what = counted(seams.repeated, "triangle repeats another", "triangles repeat another");
+        say(ObstacleKind::Faces, what, "--repair removes what is there twice");
     }
     if seams.mixed > 0 {
-        let what = format!("faces disagree about the outside along {} edges", seams.mixed);
+        let what = format!("faces disagree about the outside along {}", counted(seams.mixed, "edge", "edges"));
         say(ObstacleKind::Faces, what, "--repair turns them");
     }
     if seams.walls > 0 {
         let what = format!(
-            "{} edges belong to three triangles or more, as walls inside a body or fins on it have them",
-            seams.walls
+            "{} to three triangles or more, as walls inside a body or fins on it have them",
+            counted(seams.walls, "edge belongs", "edges belong")
         );
         say(ObstacleKind::Walls, what, "remove the faces between the parts");
     }
-    let (share, edges) = (100.0 * seams.hole_share, seams.open);
+    let (share, edges) = (percent(seams.hole_share), seams.open);
     if seams.hole_share > MOSTLY_HOLES {
         let what = format!(
-            "an open sheet has no inside ({edges} edges belong to one triangle alone; the openings are {share:.0} % of its surface)"
+            "an open sheet has no inside ({} to one triangle alone; the openings are {share} of its surface)",
+            counted(edges, "edge belongs", "edges belong")
         );
         say(ObstacleKind::Sheet, what, "give it a thickness, as a closed mesh, or close the openings of a solid body");
     } else if edges > 0 {
-        say(ObstacleKind::Holes, format!("{edges} edges are rims of holes, {share:.2} % of its surface"), "close them");
+        let what = counted(edges, "edge is the rim of a hole", "edges are rims of holes");
+        say(ObstacleKind::Holes, format!("{what}, {share} of its surface"), "close them");
     }
     if solid.parts.iter().any(|p| p.closed && p.volume.abs() <= gap * p.area && p.area > 0.0) {
         let what = format!("a closed part encloses nothing (thinner than {:.1e} units)", 2.0 * gap);
@@ -328,11 +240,11 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
     let all = parts.len();
     let union = "make one surface of them (a union), or cut one out of the other";
     if let Some(c) = &found.crossing {
-        let what = format!("two of its {all} parts overlap: they pass through each other {}", near(scene, c));
+        let what = format!("two of its {all} parts overlap: they pass through each other {}", near(scene, c, gap));
         return say(ObstacleKind::Crossing, what, union);
     }
     if let Some(c) = &found.touching {
-        let what = format!("two of its {all} parts touch: faces lie in each other {}", near(scene, c));
+        let what = format!("two of its {all} parts touch: faces lie in each other {}", near(scene, c, gap));
         let remedy = format!("join them without the faces between, or leave a gap of at least {gap:.1e} units");
         say(ObstacleKind::Touching, what, &remedy);
     }
@@ -352,9 +264,9 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
             (ObstacleKind::Blemish, "a union with itself mends that")
         };
         let what = format!(
-            "its surface meets itself {}, and maybe elsewhere; {:.2} % of it lies inside it",
-            near(scene, c),
-            100.0 * share
+            "its surface meets itself {}, and maybe elsewhere; {} of it lies inside it",
+            near(scene, c, gap),
+            percent(share)
         );
         say(kind, what, remedy);
     }
@@ -364,7 +276,7 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
 fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
     let parts = &solid.parts;
     let area: f64 = parts.iter().map(|p| p.area).sum();
-    let [mut nested, mut open, mut turned] = [(0, 0.0); 3];
+    let [mut nested, mut open, mut turned] = [(0_usize, 0.0); 3];
     for (i, part) in parts.iter().enumerate() {
         let around = |(j, other): (usize, &Part)| {
             let inside = other.bounds.0.cmple(part.bounds.0).all() && other.bounds.1.cmpge(part.bounds.1).all();
@@ -386,17 +298,23 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
     }
     let all = parts.len();
     let cavity = "remove them, or make them cavities: closed, their faces turned inwards";
-    let inside =
-        [(nested, "lie inside another part, and look outwards"), (open, "are open and lie inside a closed one")];
-    for ((count, part), what) in inside {
+    let inside = [
+        (nested, ["lies inside another part, and looks outwards", "lie inside another part, and look outwards"]),
+        (open, ["is open and lies inside a closed one", "are open and lie inside a closed one"]),
+    ];
+    for ((count, part), [one, many]) in inside {
         let kind = if part > MINOR * area { ObstacleKind::Nested } else { ObstacleKind::Blemish };
         if count > 0 {
-            say(kind, format!("{count} of its {all} parts {what}"), cavity);
+            say(kind, format!("{count} of its {all} parts {}", either(count, one, many)), cavity);
         }
     }
     if turned.0 > 0 {
         let kind = if turned.1 > MINOR * area { ObstacleKind::Turned } else { ObstacleKind::Blemish };
-        let what = format!("{} of its {all} parts look inwards with nothing around them", turned.0);
+        let (n, look) = (
+            turned.0,
+            either(turned.0, "looks inwards with nothing around it", "look inwards with nothing around them"),
+        );
+        let what = if all == 1 { "its faces look inwards".into() } else { format!("{n} of its {all} parts {look}") };
         say(kind, what, "set flip = true, or --repair turns them");
     }
 }
@@ -415,15 +333,17 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> Option<Obstacle> {
     match b.kind {
         Role::Opaque => {
             let c = found.touching?;
-            let what =
-                format!("a face of object {other:?} lies in one of the translucent object {one:?} {}", near(scene, &c));
+            let what = format!(
+                "a face of object {other:?} lies in one of the translucent object {one:?} {}",
+                near(scene, &c, gap)
+            );
             obstacle(ObstacleKind::OpaqueTouching, what, apart)
         }
         Role::Lamp => {
             if let Some(c) = found.touching {
                 let what = format!(
                     "a face of lamp {other:?} lies in one of the translucent object {one:?} {}",
-                    near(scene, &c)
+                    near(scene, &c, gap)
                 );
                 return obstacle(ObstacleKind::LampTouching, what, apart);
             }
@@ -442,14 +362,14 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> Option<Obstacle> {
             if let Some(c) = found.crossing {
                 let what = format!(
                     "the translucent objects {one:?} and {other:?} overlap: they pass through each other {}",
-                    near(scene, &c)
+                    near(scene, &c, gap)
                 );
                 return obstacle(ObstacleKind::Crossing, what, union.into());
             }
             if let Some(c) = found.touching {
                 let what = format!(
                     "the translucent objects {one:?} and {other:?} touch: faces lie in each other {}",
-                    near(scene, &c)
+                    near(scene, &c, gap)
                 );
                 let remedy = format!("{apart}, or join them into one mesh without the faces between");
                 return obstacle(ObstacleKind::Touching, what, remedy);

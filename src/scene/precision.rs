@@ -6,6 +6,7 @@ use super::doctor::COARSE;
 use super::{Material, Object, Surface, Translucent};
 use crate::geometry::{AreaTable, Mesh, Precision};
 use crate::math::DVec3;
+use crate::words::{percent, short};
 use rayon::prelude::*;
 
 /// The start of a ray may be off by this share of a body's thickness. On the slab of van de Hulst its reflectance falls by 1.5
@@ -54,8 +55,9 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         let step = farthest * f64::from(f32::EPSILON);
         if size > 0.0 && step > COARSE * size {
             choice.why_double = choice.why_double.or(Some(format!(
-                "object {:?} is {size:.3e} units large, and single precision would put its vertices on steps of {step:.1e} units",
-                object.name
+                "object {:?} is {} units large, and single precision would put its vertices on steps of {step:.1e} units",
+                object.name,
+                short(size)
             )));
         }
     }
@@ -68,16 +70,16 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         let path = 1.0 / f64::from(sigma.max());
         let decay = (0..3).map(|c| (3.0 * f64::from(absorbed[c]) * f64::from(sigma[c])).sqrt()).fold(0.0, f64::max);
         let limit = if walks(t) { (DENSE * path).min(THIN / decay) } else { f64::INFINITY };
-        let medium = || format!("{path:.3e} units, and light falls by 1/e over {:.3e}", 1.0 / decay);
+        let medium = || format!("{} units, and light falls by 1/e over {}", short(path), short(1.0 / decay));
         let why = if let Some((share, thickness)) = thinner(&probes, |p| p.offset / THIN) {
             Some(format!(
-                "object {name:?} is {thickness:.3e} units thick on {share:.0} % of its surface, from which rays in single \
+                "object {name:?} is {thickness} units thick on {share} of its surface, from which rays in single \
                  precision start {:.1e} units away",
                 offsets[number]
             ))
         } else if let Some((share, thickness)) = thinner(&probes, |_| farthest / CONTACT) {
             Some(format!(
-                "object {name:?} is {thickness:.3e} units thick on {share:.0} % of its surface; rays in single precision \
+                "object {name:?} is {thickness} units thick on {share} of its surface; rays in single precision \
                  start {farthest:.1e} units away from object {:?}",
                 objects[other].name
             ))
@@ -96,7 +98,7 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
             choice.beyond.push((
                 number,
                 format!(
-                    "it is {thickness:.1e} units thick on {share:.0} % of its surface, too thin for where it stands even in \
+                    "it is {thickness} units thick on {share} of its surface, too thin for where it stands even in \
                      double precision: rays start {offset:.1e} units away from it, and light goes astray; make it thicker or smaller"
                 ),
             ));
@@ -116,16 +118,16 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
     choice
 }
 
-/// Of all probes the percentage that is thinner than `limit` of each, and the median thickness of those; `None` where they
-/// are few.
-fn thinner(probes: &[Probe], limit: impl Fn(&Probe) -> f64) -> Option<(f64, f64)> {
+/// In words, of all probes the share that is thinner than `limit` of each, and the median thickness of those; `None` where
+/// they are few.
+fn thinner(probes: &[Probe], limit: impl Fn(&Probe) -> f64) -> Option<(String, String)> {
     let mut thin: Vec<f64> = probes.iter().filter(|p| p.thickness < limit(p)).map(|p| p.thickness.max(0.0)).collect();
     let share = thin.len() as f64 / probes.len() as f64;
     if share <= SHARE {
         return None;
     }
     thin.sort_unstable_by(f64::total_cmp);
-    Some((100.0 * share, thin[thin.len() / 2]))
+    Some((percent(share), short(thin[thin.len() / 2])))
 }
 
 /// A point of a surface and the way inwards from it.

@@ -2,8 +2,9 @@
 
 use super::file::SceneFile;
 use super::options::MethodName;
-use super::{Scene, Surface, Translucent, energy};
+use super::{ObstacleKind, Scene, Surface, Translucent, energy};
 use crate::optics::{ChannelOptics, Trust};
+use crate::words::{albedo, short};
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
 
@@ -28,9 +29,24 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             said.push(format!("{head} is used by no object"));
         } else if let Surface::Translucent(t) = &scene.materials[i].surface {
             let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
-            said.extend(outside_diffusion(t).into_iter().chain(first).map(|what| format!("{head}: {what}")));
+            let model = models_are_used(file).then(|| outside_diffusion(t).into_iter().chain(first));
+            let all = nothing_there(t).into_iter().chain(model.into_iter().flatten());
+            said.extend(all.map(|what| format!("{head}: {what}")));
         }
     }
+}
+
+/// Whether a BSSRDF is what decides of a translucent material.
+fn models_are_used(file: &SceneFile) -> bool {
+    file.method.name.is_none_or(|name| name == MethodName::Subsurface)
+}
+
+/// Channels of a medium that is none.
+fn nothing_there(t: &Translucent) -> Option<String> {
+    let sigma = t.medium.sigma_t_prime();
+    let empty: Vec<&str> = (0..3).filter(|&c| sigma[c] <= 0.0).map(|c| CHANNELS[c]).collect();
+    (!empty.is_empty())
+        .then(|| format!("no scattering and no absorption in {}: no light comes back there", empty.join(", ")))
 }
 
 /// Models of orders 2 and higher want single scattering beside them.
@@ -44,24 +60,23 @@ pub(super) fn no_first_order(t: &Translucent) -> Option<String> {
 
 /// Where the medium leaves the range of diffusion theory, by the chart of `optics`.
 fn outside_diffusion(t: &Translucent) -> Option<String> {
-    let (optics, sigma) = (ChannelOptics::of(&t.medium), t.medium.sigma_t_prime());
-    let empty: Vec<&str> = (0..3).filter(|&c| sigma[c] <= 0.0).map(|c| CHANNELS[c]).collect();
-    if !empty.is_empty() {
-        return Some(format!("no scattering and no absorption in {}: no light comes back there", empty.join(", ")));
+    if nothing_there(t).is_some() {
+        return None;
     }
+    let optics = ChannelOptics::of(&t.medium);
     let low: Vec<String> = (0..3)
         .filter(|&c| optics[c].outside_diffusion())
-        .map(|c| format!("{:.3} in {}", optics[c].alpha_prime, CHANNELS[c]))
+        .map(|c| format!("{} in {}", albedo(optics[c].alpha_prime), CHANNELS[c]))
         .collect();
     if !low.is_empty() {
         let low = low.join(", ");
         return Some(format!(
-            "reduced albedo {low}, below 0.5: outside diffusion theory, light is absorbed before it spreads and every BSSRDF model errs"
+            "reduced albedo {low}, below 0.5: outside diffusion theory, light is absorbed before it spreads and every BSSRDF model errs; method `volume_path` needs none"
         ));
     }
     (Trust::of(&optics) == Trust::PathTracing).then(|| {
-        let albedo = optics.map(|k| format!("{:.3}", k.alpha)).join(", ");
-        format!("g = {:.3} with albedo {albedo}: light goes on too straight for a BSSRDF model, which errs", t.medium.g)
+        let albedo = optics.map(|k| albedo(k.alpha)).join(", ");
+        format!("g = {} with albedo {albedo}: light goes on too straight for a BSSRDF model, which errs; method `volume_path` needs none", t.medium.g)
     })
 }
 
@@ -73,8 +88,10 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         if let Surface::Translucent(t) = &scene.materials[object.material].surface
             && let Some((lo, hi)) = object.mesh.bounds()
         {
-            said.extend(thin(t, (hi - lo).length()).map(|what| format!("{head}: {what}")));
-            if file.method.name.is_none_or(|name| name == MethodName::Subsurface) {
+            // Of a body that light hardly meets no model need be spoken.
+            if let Some(what) = thin(t, (hi - lo).length()) {
+                said.push(format!("{head}: {what}"));
+            } else if models_are_used(file) && !scene.has(object, ObstacleKind::Sheet) {
                 let material = &scene.materials[object.material].name;
                 let found = energy::of(t, object, &|| scene.untraceable(index));
                 said.extend(found.into_iter().map(|what| format!("{head}: material {material:?}: {what}")));
@@ -89,21 +106,17 @@ fn thin(t: &Translucent, diagonal: f64) -> Option<String> {
     let (c, smallest) = (0..3).map(|c| (c, f64::from(sigma[c]))).min_by(|a, b| a.1.total_cmp(&b.1))?;
     (smallest > 0.0 && smallest * diagonal < 1.0).then(|| {
         format!(
-            "the transport mean free path in {}, {:.4} units, is longer than the object's diagonal, {diagonal:.4} units: \
+            "the transport mean free path in {}, {} units, is longer than the object's diagonal, {} units: \
              it will look almost empty; check `unit` and the coefficients",
             CHANNELS[c],
-            1.0 / smallest
+            short(1.0 / smallest),
+            short(diagonal)
         )
     })
 }
 
 fn light(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
-    let shines = |o: &super::Object| match &scene.materials[o.material].surface {
-        Surface::Emissive { radiance, .. } => !radiance.is_black(),
-        _ => false,
-    };
-    let dark = scene.environment.is_black() && !scene.objects.iter().any(shines);
-    if dark && file.method.name != Some(MethodName::AmbientOcclusion) {
+    if scene.is_dark() && file.method.name != Some(MethodName::AmbientOcclusion) {
         said.push(format!(
             "{}: no light: no emissive object and no [environment]; all but ambient occlusion will be black",
             file.path.display()

@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Camera, Environment, Insides, Obstacle, ObstacleKind, Remark, doctor};
+use super::{Camera, Environment, Insides, ObstacleKind, Remark, doctor};
 use crate::bssrdf::{Bssrdf, ModelName, ModelOptions, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -95,12 +95,28 @@ impl Scene {
     /// What there is to say about the mesh of one of [`Self::objects`]; nothing if it is sound.
     pub fn remarks(&self, object: &Object) -> Vec<Remark> {
         let mut remarks = doctor::remarks(object, &self.materials[object.material].surface);
-        // Of a sheet its obstacle says it all.
-        let sheet = |o: &Obstacle| o.kind == ObstacleKind::Sheet && o.objects.contains(&object.name);
-        if object.findings.open_edges > 0 && self.obstacles().iter().any(sheet) {
+        // Of sheets and walls their obstacles say it all.
+        if object.findings.open_edges > 0 && self.has(object, ObstacleKind::Sheet) {
             remarks.retain(|r| !r.text.contains("rims of holes"));
         }
+        if object.findings.non_manifold_edges > 0 && self.has(object, ObstacleKind::Walls) {
+            remarks.retain(|r| !r.text.contains("more than two triangles"));
+        }
         remarks
+    }
+
+    /// Whether an obstacle of this kind concerns one of [`Self::objects`].
+    pub fn has(&self, object: &Object, kind: ObstacleKind) -> bool {
+        self.obstacles().iter().any(|o| o.kind == kind && o.objects.contains(&object.name))
+    }
+
+    /// Whether nothing sends out light: no emissive object, no environment.
+    pub fn is_dark(&self) -> bool {
+        let shines = |o: &Object| match &self.materials[o.material].surface {
+            Surface::Emissive { radiance, .. } => !radiance.is_black(),
+            _ => false,
+        };
+        self.environment.is_black() && !self.objects.iter().any(shines)
     }
 
     /// The surface of an object.

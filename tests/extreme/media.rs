@@ -319,7 +319,7 @@ fn values_below_zero_are_clamped_and_counted_warns() {
     let text = medium("[2, 3, 4]", "[0.05, 0.1, 0.2]", "eta = 1.3\nmodel = \"directional\"");
     let text = text.replace(BALL, "mesh = \"box.obj\"\nmaterial = \"wax\"");
     let sheet = cuboid(1.0, 0.02, 1.0);
-    let words = ["`directional` is a model of a half space", "0.0400 units thick", "method `volume_path`"];
+    let words = ["`directional` is a model of a half space", "0.04 units thick", "method `volume_path`"];
     let shots = warns(&load_with(&text, &[("box.obj", &sheet)], false).unwrap(), &words);
     let clamped: Vec<u64> = shots.iter().map(|s| s.tally.gather.clamped).collect();
     assert!(clamped.iter().any(|&n| n > 0), "{clamped:?}");

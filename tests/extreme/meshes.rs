@@ -57,7 +57,7 @@ fn shots_of(scene: &Scene) -> Vec<Shot> {
 
 #[test]
 fn only_triangles_without_area_warns() {
-    warns(&body("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").unwrap(), &["1 of 1 triangles have no area"]);
+    warns(&body("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").unwrap(), &["1 of 1 triangle has no area"]);
 }
 
 /// Slivers a billion times as long as they are wide, between sound triangles.
@@ -134,13 +134,13 @@ fn a_hole_bridged_by_a_repeated_edge_ok() {
 #[test]
 fn a_polygon_that_crosses_itself_warns() {
     let bow = cube().replace("f 5 6 8 7\n", "f 5 6 7 8\n");
-    warns(&body(&bow).unwrap(), &["body.obj: 1 of 6 polygons cross or cover themselves (the first in line 10)"]);
+    warns(&body(&bow).unwrap(), &["body.obj: 1 of 6 polygons crosses or covers itself (the first in line 10)"]);
 }
 
 #[test]
 fn a_polygon_that_is_not_plane_warns() {
     let bent = cube().replace("v 0.8 0.8 0.8\n", "v 0.8 0.8 1.8\n");
-    warns(&body(&bent).unwrap(), &["body.obj: 1 of 6 polygons are not plane", "cut them into triangles"]);
+    warns(&body(&bent).unwrap(), &["body.obj: 1 of 6 polygons is not plane", "cut them into triangles"]);
 }
 
 /// A cube whose faces have corners of their own, rounded apart by a few millionths of its size.
@@ -177,7 +177,7 @@ fn smooth_normals_without_shared_corners_warns() {
     let apart: String = (0..6).map(|i| format!("v {i} 0 0\nv {i}.5 0 0\nv {i} 1 0\nf -3 -2 -1\n")).collect();
     let text = with(&[(BALL, "mesh = \"body.obj\"\nnormals = \"smooth\"\nmaterial = \"wax\"")]);
     let load = |obj: &str| load_with(&text, &[("body.obj", obj)], false).unwrap();
-    warns(&load(&apart), &["smooths nothing on 6 of 6 triangles, which share no corner", "--repair"]);
+    warns(&load(&apart), &["smooths nothing on 6 of 6 triangles, which share no corner", "weld corners"]);
     ok(&load(&cube()));
 }
 

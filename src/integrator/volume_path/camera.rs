@@ -6,7 +6,7 @@ use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
 use super::spectrum::Spectrum;
-use super::through::{lamp_light, share_by_chance, sun_light, sun_share_by_chance};
+use super::through::{Drawn, drawn_light, share_by_chance, sun_share_by_chance};
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
 use crate::light::{Arrival, Lights, emitted};
@@ -287,12 +287,11 @@ impl Watch for Gather<'_, '_> {
         if body.through.is_some() && orders.contains(path.order) {
             let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut *path.tally);
             let lights = &path.method.light.lights;
-            let (view, from) = (path.view, (body, lights));
-            if lights.has_emitters() {
-                path.radiance += lamp_light(view, from, (x, w), spectrum, found, coins, tally) * path.direct;
-            }
-            if lights.has_suns() {
-                path.radiance += sun_light(view, from, (x, w), spectrum, found, coins, tally) * path.direct;
+            for (drawn, there) in [(Drawn::Lamps, lights.has_emitters()), (Drawn::Suns, lights.has_suns())] {
+                if there {
+                    let from = (body, lights, drawn);
+                    path.radiance += drawn_light(path.view, from, (x, w), spectrum, found, coins, tally) * path.direct;
+                }
             }
             if path.method.points_are_all(body) {
                 return false;

@@ -24,6 +24,7 @@ use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface};
 use crate::tally::{Cause, RayTally, Tally, WalkTally};
+use crate::words::short;
 use body::Body;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
@@ -277,7 +278,11 @@ impl Integrator for VolumePath {
             parts.push(match source {
                 Some(source) => Part::built(
                     format!("photons in `{name}`"),
-                    format!("{} a pass, joined to paths from the camera within {:.3} unit", source.count, source.reach),
+                    format!(
+                        "{} a pass, joined to paths from the camera within {} units",
+                        source.count,
+                        short(source.reach.into())
+                    ),
                 ),
                 None if !self.light.lights.has_emitters() && !self.light.lights.has_suns() => {
                     let why = "no area light, no sun in a picture: paths meet all light by themselves";

@@ -47,7 +47,7 @@ pub struct Source {
 /// Photons that tell how many collisions a photon leaves.
 const SOUNDING: u64 = 512;
 /// A kept collision in its task's list, which has room to grow, and among all others; later twice and with its cube.
-const BYTES_PER_PHOTON: f64 = 2.5 * size_of::<Photon>() as f64;
+const BYTES_PER_PHOTON: f64 = 3.7 * size_of::<Photon>() as f64;
 /// Photons traced by one task.
 const CHUNK: u64 = 64;
 /// Photons of the estimate that sets [`Source::yielding`].

@@ -56,12 +56,12 @@ impl Through {
         Some(Self { facets: Facets::new(mesh, eta)?, alone, all_alone, alone_above })
     }
 
-    /// Whether light of the object number `object` is left to [`lamp_light`] alone.
+    /// Whether light of the object number `object` is left to [`drawn_light`] alone.
     pub fn alone(&self, object: u32) -> bool {
         self.alone[object as usize]
     }
 
-    /// Whether light of a sun that is drawn with density `pdf` [1/sr] is left to [`sun_light`] alone.
+    /// Whether light of a sun that is drawn with density `pdf` [1/sr] is left to [`drawn_light`] alone.
     pub fn sun_alone(&self, pdf: f32) -> bool {
         pdf > self.alone_above
     }
@@ -119,33 +119,24 @@ fn density_outside(body: &Body, bend: &Bend, phase: f32) -> f32 {
     phase * transmittance(1.0 / body.eta, bend.cosines[0] as f32) * bend.focus_of_directions(body.eta.into()) as f32
 }
 
-/// Radiance that lamps send straight to the collision at `x`, through the boundary, scattered there against `w`, in which
-/// the path from the camera came: an estimate with the path's weight in it.
-///
-/// A point of a lamp is drawn, and all facets that refract its light to `x` are found: the sum over them is what
-/// arrives from there [WZHB09], caustics and all. Facets far away for the light to come through are looked for by chance,
-/// with its inverse as weight. Light reflected inside on its way is not in it.
-pub fn lamp_light(
-    view: View<'_>,
-    (body, lights): (&Body, &Lights),
-    (x, w): (DVec3, Vec3),
-    spectrum: &Spectrum,
-    found: &mut Vec<Crossing>,
-    draws: &mut Draws,
-    tally: &mut Tally,
-) -> Rgb {
-    let u = [draws.number(), draws.number(), draws.number()];
-    let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
-    let Some(lamp) = lights.point(view.scene, u) else { return Rgb::BLACK };
-    let alone = body.through.as_ref().is_some_and(|t| t.alone(lamp.object));
-    let asked = (Asked::Lamp(lamp), alone);
-    spectrum.value(&body.medium) * arriving(view, body, &asked, (x, w), horizon, found, draws, tally)
+/// Lights whose points or directions are drawn.
+#[derive(Clone, Copy)]
+pub enum Drawn {
+    /// Points of lamps.
+    Lamps,
+    /// Directions to suns.
+    Suns,
 }
 
-/// As [`lamp_light`] for suns: a direction is drawn, and all facets that refract light from there to `x` are found.
-pub fn sun_light(
+/// Radiance that lamps or suns send straight to the collision at `x`, through the boundary, scattered there against `w`, in
+/// which the path from the camera came: an estimate with the path's weight in it.
+///
+/// A point of a lamp, or a direction to a sun, is drawn, and all facets that refract its light to `x` are found: the sum over
+/// them is what arrives from there [WZHB09], caustics and all. Facets far away for the light to come through are looked for by
+/// chance, with its inverse as weight. Light reflected inside on its way is not in it.
+pub fn drawn_light(
     view: View<'_>,
-    (body, lights): (&Body, &Lights),
+    (body, lights, drawn): (&Body, &Lights, Drawn),
     (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
@@ -154,9 +145,14 @@ pub fn sun_light(
 ) -> Rgb {
     let u = [draws.number(), draws.number(), draws.number()];
     let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
-    let Some(sun) = lights.sun(u) else { return Rgb::BLACK };
-    let alone = body.through.as_ref().is_some_and(|t| t.sun_alone(sun.pdf_angle));
-    let asked = (Asked::Sun(sun), alone);
+    let through = body.through.as_ref();
+    let asked = match drawn {
+        Drawn::Lamps => {
+            lights.point(view.scene, u).map(|lamp| (Asked::Lamp(lamp), through.is_some_and(|t| t.alone(lamp.object))))
+        }
+        Drawn::Suns => lights.sun(u).map(|sun| (Asked::Sun(sun), through.is_some_and(|t| t.sun_alone(sun.pdf_angle)))),
+    };
+    let Some(asked) = asked else { return Rgb::BLACK };
     spectrum.value(&body.medium) * arriving(view, body, &asked, (x, w), horizon, found, draws, tally)
 }
 
@@ -261,7 +257,7 @@ fn is_open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &A
 }
 
 /// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
-/// a collision, that [`lamp_light`] leaves to it.
+/// a collision, that [`drawn_light`] leaves to it.
 pub fn share_by_chance(
     scene: &Scene,
     lights: &Lights,
@@ -281,7 +277,7 @@ pub fn share_by_chance(
     Densities { by_point: lights.pdf_area(hit.mesh), by_chance: straight.phase * passed * focus }.share_by_chance()
 }
 
-/// The same for a sun, drawn with density `by_point` [1/sr], and [`sun_light`].
+/// The same for a sun, drawn with density `by_point` [1/sr], and [`drawn_light`].
 pub fn sun_share_by_chance(body: &Body, straight: &Straight, by_point: f32) -> f32 {
     let Some(through) = &body.through else { return 1.0 };
     if through.sun_alone(by_point) {
@@ -362,7 +358,15 @@ mod tests {
             chance.add(lucky[0]);
             // Far less noisy, but slower.
             if i % 12 == 0 {
-                let light = lamp_light(view, (body, lights), (x, w), &spectrum, &mut found, &mut draws, &mut tally);
+                let light = drawn_light(
+                    view,
+                    (body, lights, Drawn::Lamps),
+                    (x, w),
+                    &spectrum,
+                    &mut found,
+                    &mut draws,
+                    &mut tally,
+                );
                 points.add(light[0] + lucky[1]);
             }
         }
@@ -415,7 +419,15 @@ mod tests {
                 let x = draws.direction().as_dvec3() * 0.98 - scene.centre;
                 let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
                 let w = draws.direction();
-                let light = lamp_light(view, (body, lights), (x, w), &spectrum, &mut found, &mut draws, &mut tally);
+                let light = drawn_light(
+                    view,
+                    (body, lights, Drawn::Lamps),
+                    (x, w),
+                    &spectrum,
+                    &mut found,
+                    &mut draws,
+                    &mut tally,
+                );
                 most = most.max(light.max() / found.len().max(1) as f32);
             }
             println!("{medium}: {most}");
