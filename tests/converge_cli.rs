@@ -4,7 +4,7 @@
 
 mod command;
 
-use command::{ball_under_sky, marmor};
+use command::{ball_under_sky, folder, marmor, two_lamps};
 use std::fs;
 
 #[test]
@@ -80,6 +80,39 @@ fn a_reference_may_be_given() {
     assert!(
         fs::read_to_string(folder.path().join("o/index.html")).unwrap().contains("r.exr; its own noise is not known")
     );
+}
+
+/// A millionth of the samples asks for the right lamp: no time of a test finds it often. Said by the terminal, the page and
+/// the records; a verdict is left out.
+#[test]
+fn a_light_that_was_not_met_is_said_by_reports() {
+    let folder = folder(&two_lamps(1.0, ""));
+    for (words, file) in [(["converge", "--methods"], "direct.jsonl"), (["compare", "--models"], "compare.json")] {
+        let more = ["scene.toml", words[1], "direct", "--time-budget", "100ms", "-o", words[0]];
+        let truth: &[&str] = if words[0] == "compare" { &["--truth", "direct"] } else { &[] };
+        let output = marmor(folder.path(), &[&words[..1], &more, truth].concat());
+        let told = command::text(&output.stderr);
+        assert!(output.status.success(), "{told}");
+        let out = folder.path().join(words[0]);
+        let page = fs::read_to_string(out.join("index.html")).unwrap().replace("&quot;", "\"");
+        for said in [&told, &page] {
+            assert!(said.contains("direct: not met yet: \"right\"; too few paths found it"), "{}: {told}", words[0]);
+        }
+        let written = fs::read_to_string(out.join(file)).unwrap();
+        if words[0] == "converge" {
+            assert!(page.contains("direct: no verdict: too few of its paths have met \"right\""), "{told}");
+            let last: serde_json::Value = serde_json::from_str(written.lines().last().unwrap()).unwrap();
+            assert_eq!(last["not_met"], serde_json::json!(["right"]));
+            assert!(last["self_interval"].is_null(), "{last}");
+        } else {
+            assert!(written.contains("not met yet: \\\"right\\\""), "{written}");
+        }
+    }
+    let met = command::folder(&two_lamps(1e6, ""));
+    let output =
+        marmor(met.path(), &["converge", "scene.toml", "--methods", "direct", "--time-budget", "200ms", "-o", "o"]);
+    let told = command::text(&output.stderr);
+    assert!(output.status.success() && !told.contains("not met"), "{told}");
 }
 
 /// What the methods render is what the reference is: there is nothing to tell apart.

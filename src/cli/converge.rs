@@ -1,7 +1,7 @@
 //! `marmor converge`: error against run time, for several methods on one scene. Reads in the order it runs.
 
 use super::keep::cancel_on_signals;
-use super::observers::{Records, error_figures};
+use super::observers::{Records, error_figures, own_figures};
 use super::race::{Failures, RaceArgs, Reference, Runner, command, machine, race, remarks, stored};
 use marmor::Result;
 use marmor::film::{Image, Truth, Window, png_bytes};
@@ -55,7 +55,12 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
     }
     let mut curves: Vec<ErrorCurve> = runners
         .iter()
-        .map(|r| ErrorCurve { name: r.entrant.name.clone(), seconds_setup: r.seconds_setup, points: Vec::new() })
+        .map(|r| ErrorCurve {
+            name: r.entrant.name.clone(),
+            seconds_setup: r.seconds_setup,
+            points: Vec::new(),
+            not_met: Vec::new(),
+        })
         .collect();
     let (mut next, mut told) = (vec![1; runners.len()], 0);
     args.say(&format!("{} methods in turns, {budget:.0} s each", runners.len()));
@@ -66,10 +71,12 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
             next[i] = passes + 1 + passes / 32;
             curves[i].points.push(runner.measure(truth)?);
             let record = Records::record(runner.seconds_setup, runner.seconds, &runner.tally, &runner.film);
-            let own = runner.own.last().as_ref().map(Into::into);
+            curves[i].not_met = runner.not_met();
+            let not_met = curves[i].not_met.clone();
+            let own = own_figures(runner.own.last(), &not_met);
             let error = Some(error_figures(&runner.film.image(), &truth.image)?);
             // A full disk costs the record, not the report.
-            failed.note(records[i].0.append(&Record { error, own, ..record }));
+            failed.note(records[i].0.append(&Record { error, own, not_met, ..record }));
         }
         let tenth = (10.0 * runner.seconds.total() / budget) as u32;
         if tenth > told && !args.quiet {

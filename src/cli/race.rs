@@ -252,6 +252,12 @@ impl<'a> Runner<'a> {
         if self.tally.walk.lost_many() { said.iter().map(|s| format!("{name}: {s}.")).collect() } else { Vec::new() }
     }
 
+    /// The names of the lights that its paths have met too seldom: its picture may lack them.
+    pub fn not_met(&self) -> Vec<String> {
+        let Prepared { method, scene, .. } = &self.entrant.prepared;
+        method.lights(scene).not_met(&self.tally, self.film.counts().samples)
+    }
+
     /// The errors as they are now.
     pub fn measure(&mut self, truth: &Truth) -> Result<ErrorPoint> {
         let judgement = judge(&self.film, &mut self.own, truth, None)?;
@@ -261,7 +267,7 @@ impl<'a> Runner<'a> {
         Ok(ErrorPoint { samples: self.film.passes(), seconds: self.seconds.total(), judgement, told: self.own.last() })
     }
 
-    /// What must be known of this render before its figures: samples left out, paths lost, warnings of its scene. Whatever a
+    /// What must be known of this render before its figures: samples left out, lights not met, paths lost, warnings of its scene. Whatever a
     /// run reports beside numbers goes here, and so to the top of the page and of the text.
     pub fn remarks(&self) -> Vec<String> {
         let (name, counts, gather) = (&self.entrant.name, self.film.counts(), &self.tally.gather);
@@ -271,9 +277,18 @@ impl<'a> Runner<'a> {
             (counts.negative, "samples are below zero"),
         ];
         let counted = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{name}: {n} {what}"));
+        let not_met = self.not_met();
+        let not_met = (!not_met.is_empty()).then(|| {
+            let names: Vec<String> = not_met.iter().map(|light| format!("\"{light}\"")).collect();
+            format!(
+                "{name}: not met yet: {}; too few paths found it, and figures with this picture are of one that may lack it: \
+                 give more time",
+                names.join(", ")
+            )
+        });
         let lost = self.lost();
         let warnings = self.entrant.prepared.scene.warnings.iter().map(ToString::to_string);
-        counted.chain(lost).chain(warnings).collect()
+        counted.chain(not_met).chain(lost).chain(warnings).collect()
     }
 }
 

@@ -272,7 +272,12 @@ mod tests {
             let judged = judged((samples > 1).then_some(0.5 / seconds), 0.0, 0.2);
             Point { samples, seconds, judgement: Judgement { all: judged, trimmed: judged }, told: None }
         };
-        let curve = Curve { name: "late".into(), seconds_setup: 0.1, points: points.iter().map(point).collect() };
+        let curve = Curve {
+            name: "late".into(),
+            seconds_setup: 0.1,
+            points: points.iter().map(point).collect(),
+            not_met: Vec::new(),
+        };
         Convergence {
             scene: "s".into(),
             curves: vec![curve],

@@ -44,7 +44,8 @@ impl Convergence {
     /// The bias at which a curve flattens, where it is told from none and from the noise of the reference.
     pub fn floor(&self, curve: &Curve) -> Option<Bias> {
         let last = curve.points.last()?.judgement;
-        last.trimmed.bias.filter(|bias| bias.is_seen() && why_not(&last, &last.trimmed).is_none())
+        let judged = curve.not_met.is_empty() && why_not(&last, &last.trimmed).is_none();
+        last.trimmed.bias.filter(|bias| bias.is_seen() && judged)
     }
 
     /// What came out, in sentences.
@@ -179,6 +180,11 @@ impl Convergence {
 
 fn standing(curve: &Curve, seconds: f64) -> Option<Standing> {
     let last = curve.points.iter().rev().find(|p| p.seconds <= seconds).or(curve.points.first())?;
+    let lacks = || {
+        let names: Vec<String> = curve.not_met.iter().map(|light| format!("\"{light}\"")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        (!names.is_empty()).then(|| format!("too few of its paths have met {}", listed(&names)))
+    };
     let few = || {
         let n = last.samples;
         (n < FEWEST_SAMPLES)
@@ -187,7 +193,7 @@ fn standing(curve: &Curve, seconds: f64) -> Option<Standing> {
     let at = |set: Set| -> Option<(Estimate, Option<String>)> {
         let error = curve.error_at(seconds, set)?;
         let unknown = || error.interval.is_none().then(|| "its noise has no interval".into());
-        Some((error, why_not(&last.judgement, set(last)).or_else(few).or_else(unknown)))
+        Some((error, lacks().or_else(|| why_not(&last.judgement, set(last))).or_else(few).or_else(unknown)))
     };
     let ((trimmed, no_verdict), (all, no_verdict_all)) = (at(TRIMMED)?, at(ALL)?);
     Some(Standing { name: curve.name.clone(), trimmed, all, no_verdict, no_verdict_all })
@@ -268,7 +274,7 @@ mod tests {
             Point { samples, seconds, judgement: Judgement { all, trimmed }, told: None }
         };
         let passes = (20.0 / pass).ceil() as u32;
-        Curve { name: name.into(), seconds_setup: 0.1, points: (1..=passes).map(point).collect() }
+        Curve { name: name.into(), seconds_setup: 0.1, points: (1..=passes).map(point).collect(), not_met: Vec::new() }
     }
 
     fn said(curves: Vec<Curve>) -> String {
@@ -369,6 +375,16 @@ mod tests {
             said.contains("no verdict between a and b") && said.contains("not told from the reference's noise"),
             "{said}"
         );
+    }
+
+    #[test]
+    fn a_picture_that_may_lack_a_light_has_no_verdict() {
+        let mut dim = curve("dim", 1e-3, 5e-3, 0.1, 0.1);
+        assert!(said(vec![dim.clone()]).contains("dim flattens"));
+        dim.not_met = vec!["sun".into(), "lamp".into()];
+        let said = said(vec![curve("fair", 1e-2, 0.0, 0.1, 0.1), dim]);
+        assert!(said.contains("dim: no verdict: too few of its paths have met \"sun\" and \"lamp\"."), "{said}");
+        assert!(said.contains("fair has the smallest error") && !said.contains("flattens"), "{said}");
     }
 
     #[test]
