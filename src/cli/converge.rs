@@ -63,7 +63,7 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
         })
         .collect();
     let (mut next, mut told) = (vec![1; runners.len()], 0);
-    args.say(&format!("{} methods in turns, {budget:.0} s each", runners.len()));
+    args.say(&format!("{} methods in turns, {budget} s each", runners.len()));
     let whole = race(&mut runners, budget, &cancel, |i, runner| {
         let passes = runner.film.passes();
         // Measuring takes milliseconds; steps of 3 % leave out nothing that a plot shows.
@@ -78,10 +78,10 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
             // A full disk costs the record, not the report.
             failed.note(records[i].0.append(&Record { error, own, not_met, ..record }));
         }
-        let tenth = (10.0 * runner.seconds.total() / budget) as u32;
+        let tenth = ((10.0 * runner.seconds.total() / budget) as u32).min(10);
         if tenth > told && !args.quiet {
             told = tenth;
-            eprintln!("{:3} %", (10 * tenth).min(100));
+            eprintln!("{:3} %", 10 * tenth);
         }
         Ok(())
     })?;
@@ -122,22 +122,16 @@ fn reference(
         return Ok(reference);
     }
     let budget = args.reference_budget();
-    args.say(&format!("reference: {budget:.0} s"));
+    args.say(&format!("reference: {budget} s"));
     let entrant = args.reference_entrant("reference", None, 0x7265_6665)?;
     let mut runners = [Runner::new(&entrant)?];
     race(&mut runners, budget, cancel, |_, r| r.follow())?;
     let [mut runner] = runners;
     let truth = Truth::of_film(&runner.film, &mut runner.own);
-    let text = format!(
-        "{}, another seed, {} samples of each pixel in {:.1} s; {}",
-        entrant.prepared.describe(),
-        runner.film.passes(),
-        runner.seconds.total(),
-        noise_text(&truth)
-    );
+    let text = format!("{}, {}; {}", entrant.prepared.describe(), runner.made(), noise_text(&truth));
     let path = args.output.join("reference.exr");
     failed.note(marmor::film::save(&truth.image, &path, &Default::default(), Default::default()));
-    Ok(Reference { text, truth, remarks: runner.remarks() })
+    Ok(Reference { text, truth, made: None, remarks: runner.remarks() })
 }
 
 fn noise_text(truth: &Truth) -> String {

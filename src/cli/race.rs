@@ -267,6 +267,11 @@ impl<'a> Runner<'a> {
         Ok(ErrorPoint { samples: self.film.passes(), seconds: self.seconds.total(), judgement, told: self.own.last() })
     }
 
+    /// How much was rendered of a reference, for people.
+    pub fn made(&self) -> String {
+        format!("another seed, {} samples of each pixel in {:.1} s", self.film.passes(), self.seconds.total())
+    }
+
     /// What must be known of this render before its figures: samples left out, lights not met, paths lost, warnings of its scene. Whatever a
     /// run reports beside numbers goes here, and so to the top of the page and of the text.
     pub fn remarks(&self) -> Vec<String> {
@@ -297,6 +302,8 @@ pub struct Reference {
     /// For people.
     pub text: String,
     pub truth: Truth,
+    /// How it was rendered, for people; none where it was given.
+    pub made: Option<String>,
     /// Of the render that made it.
     pub remarks: Vec<String>,
 }
@@ -323,9 +330,9 @@ pub fn stored(path: &Path) -> Result<Reference> {
         let film = Checkpoint::read(path)?.film;
         let text = format!("{text}, {} samples", film.passes());
         let truth = Truth::of_film(&film, &mut SelfError::new());
-        return Ok(Reference { text, truth, remarks: Vec::new() });
+        return Ok(Reference { text, truth, made: None, remarks: Vec::new() });
     }
-    Ok(Reference { text, truth: Truth::picture(super::read_picture(path, None)?), remarks: Vec::new() })
+    Ok(Reference { text, truth: Truth::picture(super::read_picture(path, None)?), made: None, remarks: Vec::new() })
 }
 
 /// Passes in turns until each entrant has used `budget` seconds of its own; `after` is called after each pass. The one

@@ -128,14 +128,15 @@ impl ModelComparison {
         told.sort_by(|a, b| a.1.value.total_cmp(&b.1.value));
         if let Some(&(best, bias)) = told.first() {
             let level = |b: &Bias| b.interval()[0] <= bias.interval()[1];
+            let of_those = if told.len() < self.models.len() { " of those with a verdict" } else { "" };
             let (near, far): (Vec<_>, Vec<_>) = told.iter().partition(|(_, b)| level(b));
             match &near[..] {
                 [_] if self.models.len() == 1 => out.push(format!("{}.", self.model_text(best, &bias, part))),
-                [_] => out.push(format!("{} comes nearest to the reference.", best.name)),
+                [_] => out.push(format!("{} comes nearest to the reference{of_those}.", best.name)),
                 _ => {
                     let names: Vec<&str> = near.iter().map(|(m, _)| m.name.as_str()).collect();
                     out.push(format!(
-                        "No verdict between {}, which come nearest to the reference: their intervals meet.",
+                        "No verdict between {}, which come nearest to the reference{of_those}: their intervals meet.",
                         listed(&names)
                     ));
                 }
@@ -161,14 +162,17 @@ impl ModelComparison {
     fn part_text(&self, part: Part) -> String {
         let pixels = |part| self.models.first().and_then(|m| m.figures(part)).map_or(0, |f| f.pixels);
         let [translucent, mixed, background] = [Part::Translucent, Part::Mixed, Part::Background].map(pixels);
-        let judged = match part {
-            Part::Translucent => format!("Judged by the {translucent} pixels that are translucent objects alone"),
-            Part::Mixed => {
-                format!("Judged by the {mixed} pixels that are in part translucent objects; none is that alone")
-            }
-            _ => "Judged by all pixels: no translucent object is in view".into(),
-        };
-        format!("{judged}; apart from them {mixed} mixed pixels at silhouettes and {background} of background.")
+        match part {
+            Part::Translucent => format!(
+                "Judged by the {translucent} pixels that are translucent objects alone; apart from them {mixed} mixed pixels at \
+                 silhouettes and {background} of background."
+            ),
+            Part::Mixed => format!(
+                "Judged by the {mixed} pixels that are in part translucent objects; none is that alone, and {background} are \
+                 background."
+            ),
+            _ => format!("Judged by all {} pixels: no translucent object is in view.", pixels(Part::All)),
+        }
     }
 
     fn model_text(&self, model: &Compared, bias: &Bias, part: Part) -> String {

@@ -203,7 +203,7 @@ impl Convergence {
         let head = ["method", "setup", "time", "samples", "relMSE, trimmed", "noise", "bias"];
         page.table(&[&head[..], &["relMSE, all pixels", "worst pixel's share", "slope in samples"]].concat(), &rows);
         page.heading("At equal time");
-        page.text("The same part of each picture, pixel by pixel, when all had used the same time.");
+        page.text("The same part of each picture, pixel by pixel, when each had used its time.");
         page.pictures(crops);
         if !thumbnails.is_empty() {
             page.heading("Whole pictures");

@@ -62,7 +62,7 @@ impl Convergence {
             for standing in &judged[ahead..] {
                 if is_behind(best, standing) { &mut behind } else { &mut level }.push(standing);
             }
-            out.push(self.winners_text(&level, seconds));
+            out.push(self.winners_text(&level, (judged.len(), unjudged.is_empty()), seconds));
             let others: Vec<String> = behind.iter().map(|s| self.behind_text(s, &level, seconds)).collect();
             if !others.is_empty() {
                 out.push(format!("{}.", others.join("; ")));
@@ -94,7 +94,7 @@ impl Convergence {
         out
     }
 
-    fn winners_text(&self, winners: &[&Standing], seconds: f64) -> String {
+    fn winners_text(&self, winners: &[&Standing], (judged, all_judged): (usize, bool), seconds: f64) -> String {
         let left_out = self
             .curves
             .iter()
@@ -105,13 +105,15 @@ impl Convergence {
             Some(1) => ", without the worst pixel".into(),
             Some(n) => format!(", without the worst 0.1 % of the pixels ({n})"),
         };
+        let of_those = if all_judged { "" } else { " of those with a verdict" };
         match winners {
-            [one] if self.curves.len() == 1 => {
+            // Alone, or alone with a verdict: there is nothing that it is better than.
+            [one] if self.curves.len() == 1 || !all_judged && judged == 1 => {
                 format!("At {seconds:.1} s{over}, {} has {}.", one.name, error_text(&one.trimmed))
             }
             [one] => {
                 format!(
-                    "At equal time ({seconds:.1} s){over}, {} has the smallest error: {}.",
+                    "At equal time ({seconds:.1} s){over}, {} has the smallest error{of_those}: {}.",
                     one.name,
                     error_text(&one.trimmed)
                 )
@@ -121,7 +123,7 @@ impl Convergence {
                 let errors: Vec<String> =
                     winners.iter().map(|w| format!("{} {}", w.name, error_text(&w.trimmed))).collect();
                 format!(
-                    "At equal time ({seconds:.1} s){over}, no verdict between {}, which have the smallest errors: {}.",
+                    "At equal time ({seconds:.1} s){over}, no verdict between {}, which have the smallest errors{of_those}: {}.",
                     listed(&names),
                     errors.join("; ")
                 )
@@ -358,7 +360,7 @@ mod tests {
             said.contains("copy: no verdict: it is nearer to the reference") && said.contains("share a seed."),
             "{said}"
         );
-        assert!(said.contains("fair has the smallest error"), "{said}");
+        assert!(said.contains("fair has relMSE ") && !said.contains("smallest"), "{said}");
     }
 
     #[test]
@@ -384,7 +386,10 @@ mod tests {
         dim.not_met = vec!["sun".into(), "lamp".into()];
         let said = said(vec![curve("fair", 1e-2, 0.0, 0.1, 0.1), dim]);
         assert!(said.contains("dim: no verdict: too few of its paths have met \"sun\" and \"lamp\"."), "{said}");
-        assert!(said.contains("fair has the smallest error") && !said.contains("flattens"), "{said}");
+        assert!(
+            said.contains("fair has relMSE 5.00e-4") && !said.contains("smallest") && !said.contains("flattens"),
+            "{said}"
+        );
     }
 
     #[test]
@@ -393,6 +398,6 @@ mod tests {
         short.points.truncate(2);
         let said = said(vec![curve("fair", 1e-2, 0.0, 0.1, 0.1), short]);
         assert!(said.contains("short: no verdict: 2 of the 4 samples of each pixel"), "{said}");
-        assert!(said.contains("fair has the smallest error"), "{said}");
+        assert!(said.contains("fair has relMSE ") && !said.contains("smallest"), "{said}");
     }
 }
