@@ -411,7 +411,7 @@ mod tests {
         );
         let three = |pass: u32, i: usize| if pass == 3 && [35, 60, 90].contains(&i) { 1e4 } else { noise(pass, i) };
         let said = text(12, &three);
-        assert!(said.contains("(no interval: few pixels carry the noise, the worst 33 % of it"), "{said}");
+        assert!(said.contains("(no interval: few pixels carry the noise, the worst "), "{said}");
         // Each pixel has a bright sample in 20: at 16 passes half of them have met none.
         let rare = |pass: u32, i: usize| {
             if marmor::math::hash(u64::from(pass) << 20 | i as u64) % 20 == 0 { 20.0 } else { 0.1 }
