@@ -414,7 +414,7 @@ mod tests {
         assert!(said.contains("(no interval: few pixels carry the noise, the worst "), "{said}");
         // Each pixel has a bright sample in 20: at 16 passes half of them have met none.
         let rare = |pass: u32, i: usize| {
-            if marmor::math::hash(u64::from(pass) << 20 | i as u64) % 20 == 0 { 20.0 } else { 0.1 }
+            if marmor::math::hash(u64::from(pass) << 20 | i as u64).is_multiple_of(20) { 20.0 } else { 0.1 }
         };
         assert!(text(16, &rare).contains("(no interval yet: many pixels"), "{}", text(16, &rare));
         assert!(text(512, &rare).contains("(95 %: "), "{}", text(512, &rare));
