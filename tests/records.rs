@@ -4,7 +4,7 @@
 
 mod command;
 
-use command::{ball, marmor, text};
+use command::{ball, marmor, text, two_lamps};
 use marmor::film::{Film, Window};
 use marmor::integrator::{AmbientOcclusion, View};
 use marmor::query::{self, Backend};
@@ -96,22 +96,6 @@ fn the_clock_stands_while_observers_measure_and_write() {
     // Whatever the machine does: what is told lies within the time that was not spent in the observer.
     assert!(slow.told > 0.0 && slow.told <= slow.at_work, "{} s told, {} s at work", slow.told, slow.at_work);
     assert_eq!(outcome.seconds.total(), slow.told);
-}
-
-/// A wall of 2 x 2 under a lamp from the left and one from the right; `more` stands between the wall and the right one.
-fn two_lamps(radiance: f64, more: &str) -> String {
-    let lamp = |name: &str, x: i32, half: f64, radiance: f64| {
-        format!(
-            "[[object]]\nname = \"{name}\"\nshape = \"rectangle\"\ncentre = [{x}, 0, 2]\nedge_u = [{half}, 0, {half}]\nedge_v = [0, {half}, 0]\n\
-             material = \"{name}\"\n[material.{name}]\ntype = \"emissive\"\nradiance = {radiance}\ntwo_sided = true\n"
-        )
-    };
-    let (left, right) = (lamp("left", -3, 0.5, 1e4), lamp("right", 3, 0.05, radiance));
-    format!(
-        "unit = \"mm\"\n[camera]\nposition = [0, 0, 9]\nlook_at = [0, 0, 0]\nfov = 10\nresolution = [64, 48]\n\
-         [[object]]\nshape = \"rectangle\"\ncentre = [0, 0, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 1, 0]\nmaterial = \"wall\"\n\
-         [material.wall]\ntype = \"diffuse\"\nalbedo = 0.5\n{left}{right}{more}"
-    )
 }
 
 #[test]

@@ -2,15 +2,15 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
-use marmor::film::{Film, Image, SelfError, SelfErrors, Window, metrics};
-use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View};
+use marmor::film::{FEWEST_PASSES, Film, Image, NoInterval, SelfError, SelfErrors, Window, metrics};
+use marmor::integrator::{AmbientOcclusion, Direct, Integrator, SubsurfaceOptions};
 use marmor::math::{Rgb, hash_combine};
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job, Observer, Progress};
+use marmor::render::{Observer, Progress};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use marmor::scene::{Estimator, Scene};
+use rendering::{film, load, options, subsurface};
+
+mod rendering;
 
 const WORLD: &str = r#"
     unit = "mm"
@@ -57,109 +57,112 @@ const WORLD: &str = r#"
 "#;
 
 fn world(ball: &str, environment: f32) -> Scene {
-    let text = WORLD.replace("BALL", ball).replace("ENVIRONMENT", &environment.to_string());
-    Scene::load(&SceneFile::parse(&text, Path::new("test.toml")).unwrap()).unwrap()
+    load(&WORLD.replace("BALL", ball).replace("ENVIRONMENT", &environment.to_string()))
 }
 
-/// A picture with what it says of itself and of the passes it took.
-struct Rendered {
-    image: Image,
-    said: Option<SelfErrors>,
-}
-
-/// Measures after each pass, as records do.
-#[derive(Default)]
-struct Follow {
+/// Measures after each pass, as records do, and keeps what is said after some.
+struct Follow<'a> {
+    at: &'a [u32],
     error: SelfError,
-    said: Option<SelfErrors>,
+    seen: Vec<(Image, Option<SelfErrors>)>,
 }
 
-impl Observer for Follow {
+impl Observer for Follow<'_> {
     fn after_pass(&mut self, progress: &Progress<'_>) -> marmor::Result<()> {
-        self.said = self.error.measure(progress.film);
+        let said = self.error.measure(progress.film);
+        if self.at.contains(&progress.film.passes()) {
+            self.seen.push((progress.film.image(), said));
+        }
         Ok(())
     }
 }
 
-fn render<I: Integrator>(integrator: &I, scene: &Scene, passes: u32, seed: u64, follow: bool) -> Rendered {
-    let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
-    let resolution = scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed, passes: Some(passes), time: None, cancel: &cancel };
-    let mut observer = Follow::default();
-    let mut observers: Vec<&mut dyn Observer> = if follow { vec![&mut observer] } else { Vec::new() };
-    render::run(integrator, View { scene, rays: &*rays }, &job, &mut film, &mut observers).unwrap();
-    Rendered { image: film.image(), said: observer.said }
-}
-
-fn subsurface(scene: &Scene, estimator: Estimator, cache_samples: u32, points: Points, seed: u64) -> Subsurface {
-    let options = SubsurfaceOptions {
-        single: false,
-        cache_samples,
-        estimator,
-        cut_error: None,
-        spread: Spread::Seen,
-        entry: EntrySampling::Light,
-        points,
-        specular: true,
-        light_samples: 1,
-        seed,
-    };
-    Subsurface::new(scene, options).unwrap()
+/// The picture after each number of passes in `at`, in ascending order, and what it says of itself.
+fn follow(method: &impl Integrator, scene: &Scene, at: &[u32], seed: u64) -> Vec<(Image, Option<SelfErrors>)> {
+    let mut follow = Follow { at, error: SelfError::new(), seen: Vec::new() };
+    film(method, scene, at[at.len() - 1], seed, &mut [&mut follow]);
+    follow.seen
 }
 
 /// The relMSE that is, the one that is told, and the interval that is told.
-type Told = (f64, f64, [f64; 2]);
+type Told = (f64, f64, Option<[f64; 2]>);
 
 /// What many seeds say together.
 #[derive(Debug)]
 struct Coverage {
+    name: String,
+    passes: u32,
     /// Mean of the relMSE that is.
     truth: f64,
     /// Mean of the relMSE that was told, over the mean of that which is, and its standard error.
     ratio: (f64, f64),
-    /// Share of the renders whose interval holds the relMSE that is.
+    /// Renders that tell an interval.
+    told: usize,
+    /// Share of these whose interval holds the relMSE that is.
     covered: f64,
-    /// Root mean square of log(is / told).
+    /// Root mean square of log(is / told), of all.
     spread: f64,
     /// Median half width of the interval of the logarithm.
     width: f64,
 }
 
+/// After each number of passes in `at`.
 fn coverage<I: Integrator + Sync>(
     name: &str,
     scene: &Scene,
     of: impl Fn(u64) -> I + Sync,
-    passes: u32,
+    at: &[u32],
     reference: u32,
     seeds: u64,
-) -> Coverage {
+) -> Vec<Coverage> {
     use rayon::prelude::*;
-    let reference = render(&of(1 << 40), scene, reference, 1 << 40, false).image;
-    let one = |seed: u64| {
-        let rendered = render(&of(seed), scene, passes, seed, true);
-        let is = metrics::compare(&rendered.image, &reference, None).unwrap().whole.relmse.unwrap().value;
-        let told = rendered.said.unwrap().relmse.unwrap();
-        (is, told.value, told.interval.unwrap())
+    let reference = film(&of(1 << 40), scene, reference, 1 << 40, &mut []).image();
+    let one = |(image, said): (Image, Option<SelfErrors>)| {
+        let is = metrics::compare(&image, &reference, None).unwrap().whole.relmse.unwrap().value;
+        let told = said.unwrap().relmse.unwrap();
+        (is, told.value, told.interval)
     };
-    let runs: Vec<Told> = (1..=seeds).into_par_iter().map(one).collect();
-    let n = seeds as f64;
+    let runs: Vec<Vec<Told>> = (1..=seeds)
+        .into_par_iter()
+        .map(|seed| follow(&of(seed), scene, at, seed).into_iter().map(one).collect())
+        .collect();
+    let each = at.iter().enumerate().map(|(i, &passes)| {
+        let runs: Vec<Told> = runs.iter().map(|run| run[i]).collect();
+        summary(name, passes, &runs)
+    });
+    each.collect()
+}
+
+fn summary(name: &str, passes: u32, runs: &[Told]) -> Coverage {
+    let n = runs.len() as f64;
     let mean = |f: &dyn Fn(&Told) -> f64| runs.iter().map(f).sum::<f64>() / n;
     let (truth, told) = (mean(&|r| r.0), mean(&|r| r.1));
     let ratio = told / truth;
     let error = (mean(&|r| (r.1 - ratio * r.0).powi(2)) / (n - 1.0)).sqrt() / truth;
-    let covered = mean(&|r| f64::from(u8::from(r.2[0] <= r.0 && r.0 <= r.2[1])));
+    let intervals: Vec<(f64, [f64; 2])> = runs.iter().filter_map(|r| Some((r.0, r.2?))).collect();
+    let held = intervals.iter().filter(|(is, [low, high])| low <= is && is <= high).count();
+    let covered = held as f64 / intervals.len() as f64;
     let spread = mean(&|r| (r.0 / r.1).ln().powi(2)).sqrt();
-    let mut widths: Vec<f64> = runs.iter().map(|r| (r.2[1] / r.2[0]).ln() / 2.0).collect();
+    let mut widths: Vec<f64> = intervals.iter().map(|(_, [low, high])| (high / low).ln() / 2.0).collect();
     widths.sort_by(f64::total_cmp);
-    let width = widths[widths.len() / 2];
-    let c = Coverage { truth, ratio: (ratio, error), covered, spread, width };
+    let width = widths.get(widths.len() / 2).copied().unwrap_or(f64::NAN);
+    let c = Coverage {
+        name: name.into(),
+        passes,
+        truth,
+        ratio: (ratio, error),
+        told: intervals.len(),
+        covered,
+        spread,
+        width,
+    };
     println!(
-        "{name:28} {passes:4} passes: relMSE {:.3e}, told / is {:.3} +- {:.3}, covered {:5.1} %, spread {:.3}, width / spread {:.2}",
+        "{name:28} {passes:4} passes: relMSE {:.3e}, told / is {:.3} +- {:.3}, told {:3.0} %, covered {:5.1} %, spread {:.3}, \
+         width / spread {:.2}",
         c.truth,
         c.ratio.0,
         c.ratio.1,
+        100.0 * c.told as f64 / n,
         100.0 * c.covered,
         c.spread,
         c.width / c.spread
@@ -170,28 +173,57 @@ fn coverage<I: Integrator + Sync>(
 #[test]
 fn the_error_told_is_the_error_that_is() {
     let scene = world("wax", 1.0);
-    let c = coverage(
-        "subsurface",
-        &scene,
-        |seed| subsurface(&scene, Estimator::All, 100, Points::Sobol, seed),
-        16,
-        2048,
-        60,
-    );
+    let of = |seed| subsurface(&scene, options(Estimator::All, 100, seed));
+    let c = &coverage("subsurface", &scene, of, &[16], 2048, 60)[0];
     assert!(c.ratio.1 < 0.05, "too noisy to say anything: {c:?}");
     assert!((c.ratio.0 - 1.0).abs() < 6.0 * c.ratio.1, "{c:?}");
     // 95 % of 60 with 6 standard errors of 2.8 %.
-    assert!(c.covered > 0.78, "{c:?}");
+    assert!(c.told > 50 && c.covered > 0.78, "{c:?}");
     assert!(c.width < 4.5 * c.spread, "intervals wider than the spread asks: {c:?}");
 }
 
 #[test]
 fn nothing_is_told_before_both_halves_have_a_pass() {
     let scene = world("grey", 0.3);
-    let told = |passes| render(&AmbientOcclusion { radius: f32::INFINITY, rays: 1 }, &scene, passes, 1, true).said;
-    assert!(told(1).is_none());
-    assert!(told(2).unwrap().rmse.interval.is_none());
-    assert!(told(4).unwrap().relmse.unwrap().interval.is_some());
+    let method = AmbientOcclusion { radius: f32::INFINITY, rays: 4 };
+    let told = follow(&method, &scene, &[1, 2, FEWEST_PASSES - 1, FEWEST_PASSES], 1);
+    let [none, some, more, all] = [0, 1, 2, 3].map(|i| told[i].1);
+    assert!(none.is_none());
+    for few in [some, more].map(Option::unwrap) {
+        assert!(few.rmse.interval.is_none() && few.relmse.unwrap().interval.is_none());
+        assert_eq!(few.no_interval, Some(NoInterval::FewPasses));
+    }
+    let all = all.unwrap();
+    assert!(all.relmse.unwrap().interval.is_some() && all.no_interval.is_none(), "{all:?}");
+}
+
+/// One sample of 10^4, or three, in an even picture with a little noise: what the next render has is not told by this one.
+#[test]
+fn few_pixels_with_most_of_the_error_leave_no_interval() {
+    let window = Window::full([48, 48]);
+    let said = |specks: &[usize]| {
+        let (mut film, mut error) = (Film::new([48, 48], window).unwrap(), SelfError::new());
+        for pass in 0..16 {
+            let sample = |i: usize| {
+                let noise = (hash_combine(pass, i as u64) >> 40) as f32 / 16_777_216.0;
+                Rgb::splat(if pass == 5 && specks.contains(&i) { 1e4 } else { 1.0 + 0.5 * noise })
+            };
+            film.add(window, &(0..window.area()).map(sample).collect::<Vec<_>>());
+            film.end_pass();
+            error.measure(&film);
+        }
+        error.last().unwrap()
+    };
+    let even = said(&[]);
+    assert!(even.no_interval.is_none() && even.relmse.unwrap().interval.is_some(), "{even:?}");
+    for specks in [&[100][..], &[100, 900, 1500]] {
+        let told = said(specks);
+        let worst = told.worst.unwrap();
+        assert_eq!(told.no_interval, Some(NoInterval::FewPixels), "{told:?}");
+        assert!(told.relmse.unwrap().interval.is_none() && told.rmse.interval.is_none(), "{told:?}");
+        assert!((worst.carriers - specks.len() as f64).abs() < 0.1, "{worst:?}");
+        assert!((worst.share * specks.len() as f64 - 1.0).abs() < 0.1, "{worst:?}");
+    }
 }
 
 /// Pixels that a bright lamp fills by 0 to a tenth, as at its edges: at 16 passes most have met it once or never.
@@ -220,14 +252,20 @@ fn few_bright_samples_make_the_careful_figure_larger() {
 /// with one of 88 % more are once in 2 x 10^4 times (3.9).
 const LEAST_COVERED: f64 = 0.92;
 
-/// The same with cheap renders, as many as a share needs.
+/// Above, an interval says less than is known; the same chances.
+const MOST_COVERED: f64 = 0.98;
+
+/// The same with cheap renders, as many as a share needs. One ray for each sample: dark pixels that are darker by chance make
+/// the error told 1.3 times too large at 4 passes, 1.16 at 8 and 1.08 at 16.
 #[test]
 fn intervals_cover_in_a_thousand_cheap_renders() {
     let scene = world("grey", 0.3);
-    let c =
-        coverage("ambient occlusion", &scene, |_| AmbientOcclusion { radius: f32::INFINITY, rays: 2 }, 16, 4096, 1000);
-    assert!(c.covered >= LEAST_COVERED, "{c:?}");
-    assert!(c.width < 4.5 * c.spread, "intervals wider than the spread asks: {c:?}");
+    let method = |_| AmbientOcclusion { radius: f32::INFINITY, rays: 1 };
+    for c in coverage("ambient occlusion", &scene, method, &[4, 8, 12, 16], 4096, 1000) {
+        assert_eq!(c.told > 800, c.passes >= FEWEST_PASSES, "{c:?}");
+        assert!(c.told == 0 || (LEAST_COVERED..=MOST_COVERED).contains(&c.covered), "{c:?}");
+        assert!(c.told == 0 || c.width < 4.5 * c.spread, "intervals wider than the spread asks: {c:?}");
+    }
 }
 
 /// Minutes: `cargo test --release --test self_error -- --ignored --nocapture`. docs/convergence.md has the figures.
@@ -237,19 +275,32 @@ fn intervals_cover_in_a_thousand_renders() {
     let (wax, grey) = (world("wax", 0.0), world("grey", 0.3));
     let sky = world("wax", 1.0);
     let seeds = std::env::var("MARMOR_SEEDS").ok().and_then(|n| n.parse().ok()).unwrap_or(1000);
-    let sub = |scene, estimator, samples, points| move |seed| subsurface(scene, estimator, samples, points, seed);
+    let sub = |scene, estimator, samples, points| {
+        move |seed| subsurface(scene, SubsurfaceOptions { points, ..options(estimator, samples, seed) })
+    };
+    let occlusion = |rays| move |_| AmbientOcclusion { radius: f32::INFINITY, rays };
     let few = (seeds / 4).max(10);
+    let at = [4, 8, 12, 16, 24, 32, 64];
     let all = [
-        coverage("direct", &grey, |_| Direct::new(&grey, 1).unwrap(), 16, 8192, seeds),
-        coverage("ambient occlusion", &grey, |_| AmbientOcclusion { radius: f32::INFINITY, rays: 2 }, 16, 8192, seeds),
-        coverage("subsurface, sky", &sky, sub(&sky, Estimator::All, 300, Points::Sobol), 16, 4096, seeds),
-        coverage("subsurface, lamp", &wax, sub(&wax, Estimator::All, 300, Points::Sobol), 64, 8192, few),
-        coverage("subsurface, lamp, cut", &wax, sub(&wax, Estimator::Cut, 4096, Points::Sobol), 64, 4096, few),
-        coverage("subsurface, lamp, notes", &wax, sub(&wax, Estimator::Notes, 100, Points::Independent), 64, 8192, few),
+        coverage("direct", &grey, |_| Direct::new(&grey, 1).unwrap(), &at, 8192, seeds),
+        coverage("ambient occlusion, 1 ray", &grey, occlusion(1), &at, 8192, seeds),
+        coverage("ambient occlusion, 2 rays", &grey, occlusion(2), &at, 8192, seeds),
+        coverage("subsurface, sky", &sky, sub(&sky, Estimator::All, 300, Points::Sobol), &at, 4096, seeds),
+        coverage("subsurface, lamp", &wax, sub(&wax, Estimator::All, 300, Points::Sobol), &at, 8192, seeds),
+        coverage("subsurface, lamp, cut", &wax, sub(&wax, Estimator::Cut, 4096, Points::Sobol), &at, 4096, few),
+        coverage(
+            "subsurface, lamp, notes",
+            &wax,
+            sub(&wax, Estimator::Notes, 100, Points::Independent),
+            &at,
+            8192,
+            few,
+        ),
     ];
-    for (c, n) in all.iter().zip([seeds, seeds, seeds, few, few, few]) {
-        // With fewer renders a share is less certain: four standard errors of 95 %, at least.
-        let least = LEAST_COVERED.min(0.95 - 4.0 * (0.95 * 0.05 / n as f64).sqrt());
-        assert!(c.covered >= least, "{least}: {c:?}");
+    for c in all.iter().flatten().filter(|c| c.told >= 100) {
+        // With fewer renders a share is less certain: four standard errors of 95 %.
+        let error = 4.0 * (0.95 * 0.05 / c.told as f64).sqrt();
+        let (least, most) = (LEAST_COVERED.min(0.95 - error), MOST_COVERED.max(0.95 + error));
+        assert!((least..=most).contains(&c.covered), "{}: {least} {most}: {c:?}", c.name);
     }
 }

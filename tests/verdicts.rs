@@ -3,15 +3,14 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
 use marmor::film::metrics::Estimate;
-use marmor::film::{Film, SelfError, Truth, Window, judge};
-use marmor::integrator::{Subsurface, SubsurfaceOptions, View};
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
+use marmor::film::{SelfError, Truth, judge};
+use marmor::integrator::SubsurfaceOptions;
+use marmor::render::{Observer, Progress};
 use marmor::report::{Convergence, ErrorCurve, ErrorPoint};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use marmor::scene::{Estimator, Scene};
+use rendering::{film, load, options, subsurface};
+
+mod rendering;
 
 /// A ball lit from behind by a small and very bright lamp, which some pixels at its rim reflect.
 const BACK_LIT: &str = r#"
@@ -68,50 +67,42 @@ const BUDGET: f64 = 7.2;
 /// Samples of each pixel of the reference.
 const REFERENCE: u32 = 256;
 
-fn method(scene: &Scene, way: &Way, seed: u64) -> Subsurface {
-    let options = SubsurfaceOptions {
-        single: false,
-        cache_samples: way.samples,
-        estimator: way.estimator,
-        cut_error: way.cut_error,
-        spread: Spread::Seen,
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        specular: true,
-        light_samples: 1,
-        seed,
-    };
-    Subsurface::new(scene, options).unwrap()
+/// Measures the passes that `converge` would, and gives each to `after`.
+struct After<F> {
+    error: SelfError,
+    last: u32,
+    after: F,
 }
 
-/// Calls `after` after measured passes.
-fn render(scene: &Scene, way: &Way, passes: u32, seed: u64, after: &mut dyn FnMut(&Film, &mut SelfError)) {
-    let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
-    let resolution = scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-    let cancel = AtomicBool::new(false);
-    let (method, mut error) = (method(scene, way, seed), SelfError::new());
-    for pass in 1..=passes {
-        let job = Job { seed, passes: Some(pass), time: None, cancel: &cancel };
-        render::run(&method, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-        if pass < 16 || pass % 8 == 0 || pass == passes {
-            error.measure(&film);
-            after(&film, &mut error);
+impl<F: FnMut(&Progress<'_>, &mut SelfError)> Observer for After<F> {
+    fn after_pass(&mut self, progress: &Progress<'_>) -> marmor::Result<()> {
+        let pass = progress.film.passes();
+        if pass < 16 || pass.is_multiple_of(8) || pass == self.last {
+            self.error.measure(progress.film);
+            (self.after)(progress, &mut self.error);
         }
+        Ok(())
     }
+}
+
+fn render(scene: &Scene, way: &Way, passes: u32, seed: u64, after: impl FnMut(&Progress<'_>, &mut SelfError)) {
+    let cut_error = way.cut_error;
+    let method = subsurface(scene, SubsurfaceOptions { cut_error, ..options(way.estimator, way.samples, seed) });
+    film(&method, scene, passes, seed, &mut [&mut After { error: SelfError::new(), last: passes, after }]);
 }
 
 fn report(scene: &Scene, seed: u64) -> Convergence {
     let mut truth = None;
-    render(scene, &WAYS[1], REFERENCE, seed ^ 0x7265_6665, &mut |film, error| {
-        if film.passes() == REFERENCE {
-            truth = Some(Truth::of_film(film, error));
+    render(scene, &WAYS[1], REFERENCE, seed ^ 0x7265_6665, |progress, error| {
+        if progress.film.passes() == REFERENCE {
+            truth = Some(Truth::of_film(progress.film, error));
         }
     });
     let truth = truth.unwrap();
     let curve = |way: &Way| {
         let mut points = Vec::new();
-        render(scene, way, (BUDGET / way.seconds).round() as u32, seed, &mut |film, error| {
+        render(scene, way, (BUDGET / way.seconds).round() as u32, seed, |progress, error| {
+            let film = progress.film;
             let samples = film.passes();
             let judgement = judge(film, error, &truth, None).unwrap().unwrap();
             points.push(ErrorPoint {
@@ -121,7 +112,7 @@ fn report(scene: &Scene, seed: u64) -> Convergence {
                 told: error.last(),
             });
         });
-        ErrorCurve { name: way.name.into(), seconds_setup: 0.0, points }
+        ErrorCurve { name: way.name.into(), seconds_setup: 0.0, points, not_met: Vec::new() }
     };
     Convergence {
         scene: "back-lit".into(),
@@ -141,7 +132,7 @@ fn agree(a: &Estimate, b: &Estimate) -> bool {
 #[test]
 fn seeds_do_not_contradict_each_other() {
     use rayon::prelude::*;
-    let scene = Scene::load(&SceneFile::parse(BACK_LIT, Path::new("test.toml")).unwrap()).unwrap();
+    let scene = load(BACK_LIT);
     let reports: Vec<Convergence> = (1..=6_u64).into_par_iter().map(|seed| report(&scene, seed)).collect();
     let said: Vec<String> = reports.iter().map(|r| r.sentences().join("\n")).collect();
     let all_said = said.join("\n\n");

@@ -84,7 +84,7 @@ mod tests {
         let dark = choose(&medium(0.07, 0.97, 0.0), None);
         assert!(!dark.trusted && dark.why.contains("no model is near"), "{dark:?}");
         let forward = choose(&medium(20.0, 2.0, 0.95), None);
-        assert!(!forward.trusted && forward.why.contains("g 0.950"), "{forward:?}");
+        assert!(!forward.trusted && forward.why.contains("g 0.95:"), "{forward:?}");
         let slab = choose(&medium(2.55, 0.0011, 0.0), Some(4.0));
         assert!(slab.trusted && slab.name == ModelName::SLAB, "{slab:?}");
         assert!(!choose(&medium(2.55, 0.0011, 0.0), Some(0.5)).trusted);

@@ -54,18 +54,18 @@ fn compare(args: &RaceArgs, models: &[String], truth: Option<&str>) -> Result<Ex
         Some(reference) => reference,
         None => {
             let spec = truth.unwrap_or(MethodName::VolumePath.name());
-            args.say(&format!("reference {spec}: {:.0} s", args.reference_budget()));
+            args.say(&format!("reference {spec}: {} s", args.reference_budget()));
             let entrant = args.reference_entrant(spec, Some(spec), 0x7472_7574)?;
             args.check_files(std::slice::from_ref(&entrant), &names)?;
             let mut runner = [Runner::new(&entrant)?];
             race(&mut runner, args.reference_budget(), &cancel, |_, r| r.follow())?;
             let [mut runner] = runner;
             let truth = Truth::of_film(&runner.film, &mut runner.own);
-            Reference { text: spec.to_owned(), truth, remarks: runner.remarks() }
+            Reference { text: spec.to_owned(), truth, made: Some(runner.made()), remarks: runner.remarks() }
         }
     };
     reference.truth.check(&runners[0].film)?;
-    args.say(&format!("{} in turns, {budget:.0} s each", counted(runners.len(), "model", "models")));
+    args.say(&format!("{} in turns, {budget} s each", counted(runners.len(), "model", "models")));
     let whole = race(&mut runners, budget, &cancel, |_, runner| runner.follow())?;
     args.leave_out_empty(&mut runners);
     let exposure = entrants[0].prepared.file.render.exposure.unwrap_or(0.0);
@@ -129,7 +129,12 @@ fn write(
         models,
         range,
         remarks: remarks(runners, reference),
-        footnotes: vec![format!("Machine: {}.", machine()), format!("Command: {}", command())],
+        footnotes: reference
+            .made
+            .iter()
+            .map(|made| format!("{} as the reference: {made}.", reference.text))
+            .chain([format!("Machine: {}.", machine()), format!("Command: {}", command())])
+            .collect(),
     };
     args.write("compare.csv", &report.to_csv(), failed);
     let json = serde_json::to_string_pretty(&report).map_err(|e| Error::file(folder, "write compare.json", e))?;

@@ -1,7 +1,7 @@
 //! `marmor converge`: error against run time, for several methods on one scene. Reads in the order it runs.
 
 use super::keep::cancel_on_signals;
-use super::observers::{Records, error_figures};
+use super::observers::{Records, error_figures, own_figures};
 use super::race::{Failures, RaceArgs, Reference, Runner, command, machine, race, remarks, stored};
 use marmor::Result;
 use marmor::film::{Image, Truth, Window, png_bytes};
@@ -56,10 +56,15 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
     }
     let mut curves: Vec<ErrorCurve> = runners
         .iter()
-        .map(|r| ErrorCurve { name: r.entrant.name.clone(), seconds_setup: r.seconds_setup, points: Vec::new() })
+        .map(|r| ErrorCurve {
+            name: r.entrant.name.clone(),
+            seconds_setup: r.seconds_setup,
+            points: Vec::new(),
+            not_met: Vec::new(),
+        })
         .collect();
     let (mut next, mut told) = (vec![1; runners.len()], 0);
-    args.say(&format!("{} in turns, {budget:.0} s each", counted(runners.len(), "method", "methods")));
+    args.say(&format!("{} in turns, {budget} s each", counted(runners.len(), "method", "methods")));
     let whole = race(&mut runners, budget, &cancel, |i, runner| {
         let passes = runner.film.passes();
         // Measuring takes milliseconds; steps of 3 % leave out nothing that a plot shows.
@@ -67,15 +72,17 @@ fn converge(args: &RaceArgs, methods: &[String]) -> Result<ExitCode> {
             next[i] = passes + 1 + passes / 32;
             curves[i].points.push(runner.measure(truth)?);
             let record = Records::record(runner.seconds_setup, runner.seconds, &runner.tally, &runner.film);
-            let own = runner.own.last().as_ref().map(Into::into);
+            curves[i].not_met = runner.not_met();
+            let not_met = curves[i].not_met.clone();
+            let own = own_figures(runner.own.last(), &not_met);
             let error = Some(error_figures(&runner.film.image(), &truth.image)?);
             // A full disk costs the record, not the report.
-            failed.note(records[i].0.append(&Record { error, own, ..record }));
+            failed.note(records[i].0.append(&Record { error, own, not_met, ..record }));
         }
-        let tenth = (10.0 * runner.seconds.total() / budget) as u32;
+        let tenth = ((10.0 * runner.seconds.total() / budget) as u32).min(10);
         if tenth > told && !args.quiet {
             told = tenth;
-            eprintln!("{:3} %", (10 * tenth).min(100));
+            eprintln!("{:3} %", 10 * tenth);
         }
         Ok(())
     })?;
@@ -116,22 +123,16 @@ fn reference(
         return Ok(reference);
     }
     let budget = args.reference_budget();
-    args.say(&format!("reference: {budget:.0} s"));
+    args.say(&format!("reference: {budget} s"));
     let entrant = args.reference_entrant("reference", None, 0x7265_6665)?;
     let mut runners = [Runner::new(&entrant)?];
     race(&mut runners, budget, cancel, |_, r| r.follow())?;
     let [mut runner] = runners;
     let truth = Truth::of_film(&runner.film, &mut runner.own);
-    let text = format!(
-        "{}, another seed, {} of each pixel in {:.1} s; {}",
-        entrant.prepared.describe(),
-        counted(runner.film.passes(), "sample", "samples"),
-        runner.seconds.total(),
-        noise_text(&truth)
-    );
+    let text = format!("{}, {}; {}", entrant.prepared.describe(), runner.made(), noise_text(&truth));
     let path = args.output.join("reference.exr");
     failed.note(marmor::film::save(&truth.image, &path, &Default::default(), Default::default()));
-    Ok(Reference { text, truth, remarks: runner.remarks() })
+    Ok(Reference { text, truth, made: None, remarks: runner.remarks() })
 }
 
 fn noise_text(truth: &Truth) -> String {

@@ -2,8 +2,8 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 use marmor::film::metrics::{self, Estimate};
+use marmor::film::{FEWEST_PASSES as FEWEST_INTERVAL, NoInterval, SelfError, SelfErrors, WorstPixel};
 use marmor::film::{Film, Image, Window};
-use marmor::film::{SelfError, SelfErrors, WorstPixel};
 use marmor::integrator::KnownLights;
 use marmor::render::{Observer, Progress, Seconds};
 use marmor::report::{ErrorFigures, Record, RecordFile, SelfFigures};
@@ -66,25 +66,34 @@ impl OwnError {
             return format!("no relMSE is estimated: {passes} of the 2 passes that it needs");
         };
         let Some(relmse) = told.relmse else { return "no relMSE is estimated: the picture is black".into() };
-        let interval = match relmse.interval {
-            Some([low, high]) => format!("(95 %: {low:.2e} to {high:.2e})"),
-            None if relmse.value > 0.0 && passes >= 4 => "(no interval: the earlier passes were not followed)".into(),
-            None if relmse.value > 0.0 => "(no interval before 4 passes)".into(),
-            None => return "estimated relMSE: nothing to measure, all passes are the same picture".into(),
-        };
-        let out = format!("estimated relMSE {:.2e} {interval}", relmse.value);
-        match told.worst.filter(|worst| worst.share > HANGS) {
-            Some(WorstPixel { pixel: [x, y], share, relmse }) => format!(
-                "{out}; no verdict: one pixel carries {:.0} % of the noise (pixel {x},{y}); with its light taken for noise, \
-                 relMSE {relmse:.1e}",
-                100.0 * share
-            ),
-            None => out,
+        let out = format!("estimated relMSE {:.2e}", relmse.value);
+        match (relmse.interval, told.no_interval) {
+            (Some([low, high]), _) => format!("{out} (95 %: {low:.2e} to {high:.2e})"),
+            (None, Some(why)) => format!("{out} ({})", no_interval_text(why, told.worst)),
+            (None, None) => "estimated relMSE: nothing to measure, all passes are the same picture".into(),
         }
     }
 }
 
-/// A pixel with more of the noise than this leaves no verdict.
+/// Why there is no interval, and what is known instead.
+fn no_interval_text(why: NoInterval, worst: Option<WorstPixel>) -> String {
+    match (why, worst) {
+        (NoInterval::FewPasses, _) => format!("no interval before {FEWEST_INTERVAL} passes"),
+        (NoInterval::NotFollowed, _) => "no interval: the earlier passes were not followed".into(),
+        (NoInterval::NoisyPixels, _) | (_, None) => {
+            "no interval yet: many pixels have met light too seldom to tell how bright they are".into()
+        }
+        (NoInterval::FewPixels, Some(WorstPixel { pixel: [x, y], share, relmse, .. })) => {
+            let carry = if share > HANGS { "one pixel carries" } else { "few pixels carry the noise, the worst" };
+            format!(
+                "no interval: {carry} {:.0} % of it (pixel {x},{y}); with bright specks taken for noise, relMSE {relmse:.1e}",
+                100.0 * share
+            )
+        }
+    }
+}
+
+/// A pixel with more of the noise than this is named alone.
 const HANGS: f64 = 0.5;
 
 /// Measures the error from the halves of the film and stops the render when it is small enough. Goes before the
@@ -306,10 +315,7 @@ impl Observer for Records {
             None => None,
         };
         let not_met = self.own.not_met();
-        let mut own: Option<SelfFigures> = self.own.get().as_ref().map(Into::into);
-        if let Some(own) = own.as_mut().filter(|_| !not_met.is_empty()) {
-            own.self_interval = None;
-        }
+        let own = own_figures(self.own.get(), &not_met);
         let record = Self::record(self.seconds_setup, progress.seconds, progress.tally, progress.film);
         if let Err(error) = self.file.append(&Record { error, own, not_met, ..record }) {
             if self.failed.is_none() {
@@ -345,6 +351,15 @@ pub fn check_reference(path: &Path, image: &Image, resolution: [u32; 2], window:
         size(image.resolution, image.window),
         size(resolution, window)
     )))
+}
+
+/// What a record says of a render's own error: without an interval where lights are not met.
+pub fn own_figures(told: Option<SelfErrors>, not_met: &[String]) -> Option<SelfFigures> {
+    let mut own: Option<SelfFigures> = told.as_ref().map(Into::into);
+    if let Some(own) = own.as_mut().filter(|_| !not_met.is_empty()) {
+        own.self_interval = None;
+    }
+    own
 }
 
 /// The figures of a record.
@@ -392,12 +407,24 @@ mod tests {
         let noise =
             |pass: u32, i: usize| 1.0 + (marmor::math::hash(u64::from(pass) << 20 | i as u64) % 100) as f32 / 100.0;
         assert!(text(1, &noise).contains("1 of the 2 passes"));
-        assert!(text(3, &noise).contains("no interval before 4 passes"));
-        assert!(text(8, &noise).contains("(95 %: ") && !text(8, &noise).contains("no verdict"));
+        assert!(text(11, &noise).contains("no interval before 12 passes"));
+        assert!(text(12, &noise).contains("(95 %: ") && !text(12, &noise).contains("no interval"));
         assert!(text(8, &|_, _| 0.0).contains("black"));
         let speck = |pass: u32, i: usize| if (pass, i) == (3, 35) { 1e4 } else { noise(pass, i) };
-        let said = text(8, &speck);
-        assert!(said.contains("no verdict: one pixel carries 100 % of the noise (pixel 3,2)"), "{said}");
+        let said = text(12, &speck);
+        assert!(
+            said.contains("(no interval: one pixel carries 100 % of it (pixel 3,2)") && !said.contains("95 %"),
+            "{said}"
+        );
+        let three = |pass: u32, i: usize| if pass == 3 && [35, 60, 90].contains(&i) { 1e4 } else { noise(pass, i) };
+        let said = text(12, &three);
+        assert!(said.contains("(no interval: few pixels carry the noise, the worst "), "{said}");
+        // Each pixel has a bright sample in 20: at 16 passes half of them have met none.
+        let rare = |pass: u32, i: usize| {
+            if marmor::math::hash(u64::from(pass) << 20 | i as u64).is_multiple_of(20) { 20.0 } else { 0.1 }
+        };
+        assert!(text(16, &rare).contains("(no interval yet: many pixels"), "{}", text(16, &rare));
+        assert!(text(512, &rare).contains("(95 %: "), "{}", text(512, &rare));
     }
 
     #[test]

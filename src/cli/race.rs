@@ -254,6 +254,12 @@ impl<'a> Runner<'a> {
         if self.tally.walk.lost_many() { said.iter().map(|s| format!("{name}: {s}.")).collect() } else { Vec::new() }
     }
 
+    /// The names of the lights that its paths have met too seldom: its picture may lack them.
+    pub fn not_met(&self) -> Vec<String> {
+        let Prepared { method, scene, .. } = &self.entrant.prepared;
+        method.lights(scene).not_met(&self.tally, self.film.counts().samples)
+    }
+
     /// The errors as they are now.
     pub fn measure(&mut self, truth: &Truth) -> Result<ErrorPoint> {
         let judgement = judge(&self.film, &mut self.own, truth, None)?;
@@ -263,7 +269,12 @@ impl<'a> Runner<'a> {
         Ok(ErrorPoint { samples: self.film.passes(), seconds: self.seconds.total(), judgement, told: self.own.last() })
     }
 
-    /// What must be known of this render before its figures: samples left out, paths lost, warnings of its scene. Whatever a
+    /// How much was rendered of a reference, for people.
+    pub fn made(&self) -> String {
+        format!("another seed, {} samples of each pixel in {:.1} s", self.film.passes(), self.seconds.total())
+    }
+
+    /// What must be known of this render before its figures: samples left out, lights not met, paths lost, warnings of its scene. Whatever a
     /// run reports beside numbers goes here, and so to the top of the page and of the text.
     pub fn remarks(&self) -> Vec<String> {
         let (name, counts, gather) = (&self.entrant.name, self.film.counts(), &self.tally.gather);
@@ -273,9 +284,18 @@ impl<'a> Runner<'a> {
             (counts.negative, "samples are below zero"),
         ];
         let counted = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{name}: {n} {what}"));
+        let not_met = self.not_met();
+        let not_met = (!not_met.is_empty()).then(|| {
+            let names: Vec<String> = not_met.iter().map(|light| format!("\"{light}\"")).collect();
+            format!(
+                "{name}: not met yet: {}; too few paths found it, and figures with this picture are of one that may lack it: \
+                 give more time",
+                names.join(", ")
+            )
+        });
         let lost = self.lost();
         let warnings = self.entrant.prepared.scene.warnings.iter().map(ToString::to_string);
-        counted.chain(lost).chain(warnings).collect()
+        counted.chain(not_met).chain(lost).chain(warnings).collect()
     }
 }
 
@@ -284,6 +304,8 @@ pub struct Reference {
     /// For people.
     pub text: String,
     pub truth: Truth,
+    /// How it was rendered, for people; none where it was given.
+    pub made: Option<String>,
     /// Of the render that made it.
     pub remarks: Vec<String>,
 }
@@ -312,9 +334,9 @@ pub fn stored(path: &Path) -> Result<Reference> {
         let film = Checkpoint::read(path)?.film;
         let text = format!("{text}, {}", counted(film.passes(), "sample", "samples"));
         let truth = Truth::of_film(&film, &mut SelfError::new());
-        return Ok(Reference { text, truth, remarks: Vec::new() });
+        return Ok(Reference { text, truth, made: None, remarks: Vec::new() });
     }
-    Ok(Reference { text, truth: Truth::picture(super::read_picture(path, None)?), remarks: Vec::new() })
+    Ok(Reference { text, truth: Truth::picture(super::read_picture(path, None)?), made: None, remarks: Vec::new() })
 }
 
 /// Passes in turns until each entrant has used `budget` seconds of its own; `after` is called after each pass. The one

@@ -3,7 +3,7 @@
 use marmor::bssrdf::ModelName;
 use marmor::film::Film;
 use marmor::integrator::{
-    AmbientOcclusion, Direct, Part, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
+    AmbientOcclusion, Direct, KnownLights, Part, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
 };
 use marmor::query::Backend;
 use marmor::render::{self, Job, Observer, Outcome};
@@ -87,6 +87,17 @@ impl Method {
             Self::Direct(m) => m.pass_bytes(view),
             Self::Subsurface(m) => m.pass_bytes(view),
             Self::VolumePath(m) => m.pass_bytes(view),
+        }
+    }
+
+    /// The lights that it must have found before its error is told.
+    pub fn lights(&self, scene: &Scene) -> KnownLights {
+        use marmor::integrator::Integrator as _;
+        match self {
+            Self::AmbientOcclusion(m) => m.lights(scene),
+            Self::Direct(m) => m.lights(scene),
+            Self::Subsurface(m) => m.lights(scene),
+            Self::VolumePath(m) => m.lights(scene),
         }
     }
 

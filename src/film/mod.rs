@@ -30,7 +30,7 @@ pub use image::{FilePicture, Image};
 pub use judge::{Bias, Brightness, Judged, Judgement, Truth, brightness, judge};
 pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, png_bytes, save, save_with_layers};
 pub use png_file::PngReport;
-pub use self_error::{SelfError, SelfErrors, WorstPixel};
+pub use self_error::{FEWEST_PASSES, NoInterval, SelfError, SelfErrors, WorstPixel};
 pub use sums::{BadSample, Counts, Film};
 pub use variance::variance;
 pub use window::Window;

@@ -14,6 +14,11 @@
 //! the other; a and b are independent, so (a, b)^2 has the expectation tr(C_a C_b). Taken block by block, since errors far
 //! apart do not go together, this has as many degrees of freedom as there are blocks that count. How far is far differs,
 //! so blocks of up to three sizes are tried.
+//!
+//! w has to come from x too, and x is noisy: dark pixels that happen to be darker count too much, pixels that have met little
+//! light and much at a time too little. Half of each pixel's noise, taken off the square of its level, changes S by a factor e^c.
+//! The error of S by its weights is of that size, of either sign, and no spread tells of it: it widens the interval, and where it
+//! is large there is none. docs/convergence.md has what that covers.
 
 use super::metrics::{BLOCK, Estimate, student_975};
 use super::{Film, Window};
@@ -33,7 +38,43 @@ pub struct SelfErrors {
     /// The pixel that carries most of the noise, where a speck of one half does not count for the level of its pixel; none
     /// without noise.
     pub worst: Option<WorstPixel>,
+    /// Why `rmse` and `relmse` have no interval; none where they have one, and without noise.
+    pub no_interval: Option<NoInterval>,
 }
+
+/// Why an error is told without an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoInterval {
+    /// Fewer than [`FEWEST_PASSES`].
+    FewPasses,
+    /// Few pixels carry most of the noise: other passes would have others.
+    FewPixels,
+    /// Single pixels are so noisy that it is not known how much they count.
+    NoisyPixels,
+    /// The film was not followed while it grew.
+    NotFollowed,
+}
+
+impl NoInterval {
+    /// `by_weights` is c of the head of this file.
+    fn of(now: &State, rmse: &Estimate, worst: Option<WorstPixel>, by_weights: f64) -> Option<Self> {
+        if rmse.value == 0.0 {
+            None
+        } else if now.total() < FEWEST_PASSES {
+            Some(Self::FewPasses)
+        } else if worst.is_some_and(|worst| worst.carriers < FEWEST_CARRIERS) {
+            Some(Self::FewPixels)
+        } else if by_weights > MOST_BY_WEIGHTS {
+            Some(Self::NoisyPixels)
+        } else {
+            rmse.interval.is_none().then_some(Self::NotFollowed)
+        }
+    }
+}
+
+/// Passes before an error has an interval: below, intervals are measured to hold in up to 99 % of renders.
+pub const FEWEST_PASSES: u32 = 12;
 
 /// A pixel and what hangs on it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -42,6 +83,8 @@ pub struct WorstPixel {
     pub pixel: [u32; 2],
     /// Its share of the noise.
     pub share: f64,
+    /// How many pixels the noise is spread over, (sum of squares)² / sum of their squares.
+    pub carriers: f64,
     /// relMSE of all pixels, with the lesser half for the level of each: what it is if bright specks are noise.
     pub relmse: f64,
 }
@@ -112,14 +155,16 @@ impl State {
         let floor = 0.01 * (level / (3 * pixels.len()) as f64).powi(2);
         let square =
             |i: usize| -> f64 { (0..3).map(|c| self.difference(i, c).powi(2) / (lesser(i, c).powi(2) + floor)).sum() };
-        let (mut sum, mut worst) = (0.0, (0, 0.0));
+        let (mut sum, mut squared, mut worst) = (0.0, 0.0, (0, 0.0));
         for &i in pixels {
             let one = square(i);
             sum += one;
+            squared += one * one;
             worst = if one > worst.1 { (i, one) } else { worst };
         }
         let relmse = self.scale() * sum / (3 * pixels.len()) as f64;
-        (floor > 0.0 && sum > 0.0).then(|| WorstPixel { pixel: window.pixel(worst.0), share: worst.1 / sum, relmse })
+        let (share, carriers) = (worst.1 / sum, sum * sum / squared);
+        (floor > 0.0 && sum > 0.0).then(|| WorstPixel { pixel: window.pixel(worst.0), share, carriers, relmse })
     }
 
     /// Whether both halves of `later` have passes that this has not, together so many that their noise is like that of
@@ -154,7 +199,7 @@ impl SelfError {
     }
 
     /// The errors of `film` as it is now, which must be the film of the earlier calls with passes added, or a new one.
-    /// None before both halves have a pass; without intervals before both have two.
+    /// None before both halves have a pass; without intervals before [`FEWEST_PASSES`].
     pub fn measure(&mut self, film: &Film) -> Option<SelfErrors> {
         let now = State::of(film)?;
         self.earlier.retain(|s| (0..2).all(|h| s.passes[h] <= now.passes[h]));
@@ -169,12 +214,23 @@ impl SelfError {
             (now.mean(i, c).powi(2) - CAREFUL * noise).max(0.0)
         };
         let lit = floor > 0.0;
-        let errors = SelfErrors {
-            rmse: estimate(&|_, _| 1.0).sqrt(),
-            relmse: lit.then(|| estimate(&|i, c| 1.0 / (now.mean(i, c).powi(2) + floor))),
-            relmse_careful: lit.then(|| now.noise(&pixels, &|i, c| 1.0 / (level(i, c) + floor))),
-            worst: now.worst(&pixels, film.window()),
-        };
+        let mut rmse = estimate(&|_, _| 1.0).sqrt();
+        let mut relmse = lit.then(|| estimate(&|i, c| 1.0 / (now.mean(i, c).powi(2) + floor)));
+        let relmse_careful = lit.then(|| now.noise(&pixels, &|i, c| 1.0 / (level(i, c) + floor)));
+        let worst = now.worst(&pixels, film.window());
+        let by_weights = relmse.zip(relmse_careful).map_or(0.0, |(plain, careful)| (careful / plain.value).ln());
+        let no_interval = NoInterval::of(&now, &rmse, worst, by_weights);
+        if no_interval.is_some() {
+            rmse.interval = None;
+        }
+        relmse = relmse.map(|plain| match plain.interval {
+            Some([low, high]) if no_interval.is_none() => {
+                let width = ((high / low).ln() / 2.0).hypot(WEIGHTS * by_weights);
+                Estimate { interval: Some([plain.value * (-width).exp(), plain.value * width.exp()]), ..plain }
+            }
+            _ => Estimate { interval: None, ..plain },
+        });
+        let errors = SelfErrors { rmse, relmse, relmse_careful, worst, no_interval };
         if self.pixels.is_none() && pixels.len() != film.window().area() {
             self.pixels = Some(pixels);
         }
@@ -220,6 +276,16 @@ const KEPT: usize = 2;
 /// Share of a pixel's noise that is taken off the square of its level for `relmse_careful`. All of it would be right in the
 /// mean of the level, but the inverse is then far too large where the noise is; half is measured to serve all scenes.
 const CAREFUL: f64 = 0.5;
+
+/// Pixels that the noise is spread over, at the least, for an interval: with fewer, the next pass may bring one as bad.
+const FEWEST_CARRIERS: f64 = 4.0;
+
+/// What the weights may be wrong by, in units of c at the head of this file: about 1 is what it is in single pictures; this holds it
+/// in large ones too, where nothing else widens the interval.
+const WEIGHTS: f64 = 1.6;
+
+/// The largest c of an error that has an interval: beyond, light that has not been met may be most of it.
+const MOST_BY_WEIGHTS: f64 = 0.25;
 
 /// Passes now over passes then, at the least, for a difference between the two that is like the error of all. That of a
 /// few passes more is not: noise of single passes is spread over more pixels.

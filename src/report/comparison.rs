@@ -129,14 +129,15 @@ impl ModelComparison {
         told.sort_by(|a, b| a.1.value.total_cmp(&b.1.value));
         if let Some(&(best, bias)) = told.first() {
             let level = |b: &Bias| b.interval()[0] <= bias.interval()[1];
+            let of_those = if told.len() < self.models.len() { " of those with a verdict" } else { "" };
             let (near, far): (Vec<_>, Vec<_>) = told.iter().partition(|(_, b)| level(b));
             match &near[..] {
                 [_] if self.models.len() == 1 => out.push(format!("{}.", self.model_text(best, &bias, part))),
-                [_] => out.push(format!("{} comes nearest to the reference.", best.name)),
+                [_] => out.push(format!("{} comes nearest to the reference{of_those}.", best.name)),
                 _ => {
                     let names: Vec<&str> = near.iter().map(|(m, _)| m.name.as_str()).collect();
                     out.push(format!(
-                        "No verdict between {}, which come nearest to the reference: their intervals meet.",
+                        "No verdict between {}, which come nearest to the reference{of_those}: their intervals meet.",
                         listed(&names)
                     ));
                 }
@@ -162,21 +163,26 @@ impl ModelComparison {
     fn part_text(&self, part: Part) -> String {
         let pixels = |part| self.models.first().and_then(|m| m.figures(part)).map_or(0, |f| f.pixels);
         let [translucent, mixed, background] = [Part::Translucent, Part::Mixed, Part::Background].map(pixels);
-        let judged = match part {
-            Part::Translucent => match translucent {
-                1 => "Judged by the one pixel that is a translucent object alone".into(),
-                n => format!("Judged by the {n} pixels that are translucent objects alone"),
-            },
+        match part {
+            Part::Translucent => {
+                let judged = match translucent {
+                    1 => "the one pixel that is a translucent object alone".into(),
+                    n => format!("the {n} pixels that are translucent objects alone"),
+                };
+                format!(
+                    "Judged by {judged}; apart from them {} at silhouettes and {background} of background.",
+                    counted(mixed, "mixed pixel", "mixed pixels")
+                )
+            }
             Part::Mixed => {
                 let pixels = counted(mixed, "pixel that is", "pixels that are");
-                format!("Judged by the {pixels} in part translucent objects; none is that alone")
+                let background = counted(background, "is", "are");
+                format!(
+                    "Judged by the {pixels} in part translucent objects; none is that alone, and {background} background."
+                )
             }
-            _ => "Judged by all pixels: no translucent object is in view".into(),
-        };
-        format!(
-            "{judged}; apart from them {} at silhouettes and {background} of background.",
-            counted(mixed, "mixed pixel", "mixed pixels")
-        )
+            _ => format!("Judged by all {} pixels: no translucent object is in view.", pixels(Part::All)),
+        }
     }
 
     fn model_text(&self, model: &Compared, bias: &Bias, part: Part) -> String {

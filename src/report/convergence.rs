@@ -203,7 +203,7 @@ impl Convergence {
         let head = ["method", "setup", "time", "samples", "relMSE, trimmed", "noise", "bias"];
         page.table(&[&head[..], &["relMSE, all pixels", "worst pixel's share", "slope in samples"]].concat(), &rows);
         page.heading("At equal time");
-        page.text("The same part of each picture, pixel by pixel, when all had used the same time.");
+        page.text("The same part of each picture, pixel by pixel, when each had used its time.");
         page.pictures(crops);
         if !thumbnails.is_empty() {
             page.heading("Whole pictures");
@@ -272,7 +272,12 @@ mod tests {
             let judged = judged((samples > 1).then_some(0.5 / seconds), 0.0, 0.2);
             Point { samples, seconds, judgement: Judgement { all: judged, trimmed: judged }, told: None }
         };
-        let curve = Curve { name: "late".into(), seconds_setup: 0.1, points: points.iter().map(point).collect() };
+        let curve = Curve {
+            name: "late".into(),
+            seconds_setup: 0.1,
+            points: points.iter().map(point).collect(),
+            not_met: Vec::new(),
+        };
         Convergence {
             scene: "s".into(),
             curves: vec![curve],

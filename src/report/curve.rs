@@ -12,6 +12,8 @@ pub struct Curve {
     pub seconds_setup: f64,
     /// In order of time.
     pub points: Vec<Point>,
+    /// Lights that its paths have met too seldom to the end: there is no verdict on a picture that may lack them.
+    pub not_met: Vec<String>,
 }
 
 /// A measurement.
@@ -214,7 +216,7 @@ pub(super) mod tests {
                 told: None,
             }
         };
-        Curve { name: "c".into(), seconds_setup: 0.1, points: (1..200).map(point).collect() }
+        Curve { name: "c".into(), seconds_setup: 0.1, points: (1..200).map(point).collect(), not_met: Vec::new() }
     }
 
     #[test]

@@ -132,7 +132,7 @@ impl Profile {
             );
             let _ = writeln!(out, "# total,transfer equation,{name},{}", digits(self.reference_total(c), 6));
             for curve in &self.curves {
-                let _ = writeln!(out, "# total,{},{name},{}", curve.name, digits(curve.total[c].into(), 6));
+                let _ = writeln!(out, "# total,{},{name},{}", curve.name, digits(curve.total[c], 6));
             }
         }
         out.push_str("curve,channel,r,exitance,standard_error\n");
@@ -226,7 +226,7 @@ impl Profile {
             Some(run) => notes.push(format!("  Monte Carlo {}", albedo(run.reflectance))),
             None => notes.push(format!("  transfer equation {}", albedo(self.reference_total(c)))),
         }
-        notes.extend(self.curves.iter().map(|curve| format!("  {} {}", curve.name, albedo(curve.total[c].into()))));
+        notes.extend(self.curves.iter().map(|curve| format!("  {} {}", curve.name, albedo(curve.total[c]))));
         notes
     }
 

@@ -1,7 +1,7 @@
 //! One JSON line per pass.
 
 use crate::error::{Error, Result};
-use crate::film::{Counts, SelfErrors, check_replaceable, write_atomically};
+use crate::film::{Counts, NoInterval, SelfErrors, check_replaceable, write_atomically};
 use crate::input;
 use crate::tally::{Clock, GatherTally, RayTally, WalkTally};
 use serde::Serialize;
@@ -67,8 +67,10 @@ pub struct SelfFigures {
     pub self_rmse: f64,
     /// relMSE; `null` if the picture is black.
     pub self_relmse: Option<f64>,
-    /// 95 % interval of `self_relmse`; `null` before four passes, and while a light is not met.
+    /// 95 % interval of `self_relmse`; `null` where it is not known, and while a light is not met.
     pub self_interval: Option<[f64; 2]>,
+    /// Why the error has no interval, but for lights; `null` where it has one.
+    pub self_no_interval: Option<NoInterval>,
 }
 
 impl From<&SelfErrors> for SelfFigures {
@@ -77,6 +79,7 @@ impl From<&SelfErrors> for SelfFigures {
             self_rmse: errors.rmse.value,
             self_relmse: errors.relmse.map(|e| e.value),
             self_interval: errors.relmse.and_then(|e| e.interval),
+            self_no_interval: errors.no_interval,
         }
     }
 }

@@ -44,7 +44,8 @@ impl Convergence {
     /// The bias at which a curve flattens, where it is told from none and from the noise of the reference.
     pub fn floor(&self, curve: &Curve) -> Option<Bias> {
         let last = curve.points.last()?.judgement;
-        last.trimmed.bias.filter(|bias| bias.is_seen() && why_not(&last, &last.trimmed).is_none())
+        let judged = curve.not_met.is_empty() && why_not(&last, &last.trimmed).is_none();
+        last.trimmed.bias.filter(|bias| bias.is_seen() && judged)
     }
 
     /// What came out, in sentences.
@@ -61,7 +62,7 @@ impl Convergence {
             for standing in &judged[ahead..] {
                 if is_behind(best, standing) { &mut behind } else { &mut level }.push(standing);
             }
-            out.push(self.winners_text(&level, seconds));
+            out.push(self.winners_text(&level, (judged.len(), unjudged.is_empty()), seconds));
             let others: Vec<String> = behind.iter().map(|s| self.behind_text(s, &level, seconds)).collect();
             if !others.is_empty() {
                 out.push(format!("{}.", others.join("; ")));
@@ -93,7 +94,7 @@ impl Convergence {
         out
     }
 
-    fn winners_text(&self, winners: &[&Standing], seconds: f64) -> String {
+    fn winners_text(&self, winners: &[&Standing], (judged, all_judged): (usize, bool), seconds: f64) -> String {
         let left_out = self
             .curves
             .iter()
@@ -104,13 +105,15 @@ impl Convergence {
             Some(1) => ", without the worst pixel".into(),
             Some(n) => format!(", without the worst 0.1 % of the pixels ({n})"),
         };
+        let of_those = if all_judged { "" } else { " of those with a verdict" };
         match winners {
-            [one] if self.curves.len() == 1 => {
+            // Alone, or alone with a verdict: there is nothing that it is better than.
+            [one] if self.curves.len() == 1 || !all_judged && judged == 1 => {
                 format!("At {seconds:.1} s{over}, {} has {}.", one.name, error_text(&one.trimmed))
             }
             [one] => {
                 format!(
-                    "At equal time ({seconds:.1} s){over}, {} has the smallest error: {}.",
+                    "At equal time ({seconds:.1} s){over}, {} has the smallest error{of_those}: {}.",
                     one.name,
                     error_text(&one.trimmed)
                 )
@@ -120,7 +123,7 @@ impl Convergence {
                 let errors: Vec<String> =
                     winners.iter().map(|w| format!("{} {}", w.name, error_text(&w.trimmed))).collect();
                 format!(
-                    "At equal time ({seconds:.1} s){over}, no verdict between {}, which have the smallest errors: {}.",
+                    "At equal time ({seconds:.1} s){over}, no verdict between {}, which have the smallest errors{of_those}: {}.",
                     listed(&names),
                     errors.join("; ")
                 )
@@ -179,6 +182,11 @@ impl Convergence {
 
 fn standing(curve: &Curve, seconds: f64) -> Option<Standing> {
     let last = curve.points.iter().rev().find(|p| p.seconds <= seconds).or(curve.points.first())?;
+    let lacks = || {
+        let names: Vec<String> = curve.not_met.iter().map(|light| format!("\"{light}\"")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        (!names.is_empty()).then(|| format!("too few of its paths have met {}", listed(&names)))
+    };
     let few = || {
         let n = last.samples;
         (n < FEWEST_SAMPLES)
@@ -187,7 +195,7 @@ fn standing(curve: &Curve, seconds: f64) -> Option<Standing> {
     let at = |set: Set| -> Option<(Estimate, Option<String>)> {
         let error = curve.error_at(seconds, set)?;
         let unknown = || error.interval.is_none().then(|| "its noise has no interval".into());
-        Some((error, why_not(&last.judgement, set(last)).or_else(few).or_else(unknown)))
+        Some((error, lacks().or_else(|| why_not(&last.judgement, set(last))).or_else(few).or_else(unknown)))
     };
     let ((trimmed, no_verdict), (all, no_verdict_all)) = (at(TRIMMED)?, at(ALL)?);
     Some(Standing { name: curve.name.clone(), trimmed, all, no_verdict, no_verdict_all })
@@ -268,7 +276,7 @@ mod tests {
             Point { samples, seconds, judgement: Judgement { all, trimmed }, told: None }
         };
         let passes = (20.0 / pass).ceil() as u32;
-        Curve { name: name.into(), seconds_setup: 0.1, points: (1..=passes).map(point).collect() }
+        Curve { name: name.into(), seconds_setup: 0.1, points: (1..=passes).map(point).collect(), not_met: Vec::new() }
     }
 
     fn said(curves: Vec<Curve>) -> String {
@@ -352,7 +360,7 @@ mod tests {
             said.contains("copy: no verdict: it is nearer to the reference") && said.contains("share a seed."),
             "{said}"
         );
-        assert!(said.contains("fair has the smallest error"), "{said}");
+        assert!(said.contains("fair has relMSE ") && !said.contains("smallest"), "{said}");
     }
 
     #[test]
@@ -372,11 +380,24 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_that_may_lack_a_light_has_no_verdict() {
+        let mut dim = curve("dim", 1e-3, 5e-3, 0.1, 0.1);
+        assert!(said(vec![dim.clone()]).contains("dim flattens"));
+        dim.not_met = vec!["sun".into(), "lamp".into()];
+        let said = said(vec![curve("fair", 1e-2, 0.0, 0.1, 0.1), dim]);
+        assert!(said.contains("dim: no verdict: too few of its paths have met \"sun\" and \"lamp\"."), "{said}");
+        assert!(
+            said.contains("fair has relMSE 5.00e-4") && !said.contains("smallest") && !said.contains("flattens"),
+            "{said}"
+        );
+    }
+
+    #[test]
     fn few_samples_have_no_verdict() {
         let mut short = curve("short", 1e-3, 0.0, 10.0, 0.1);
         short.points.truncate(2);
         let said = said(vec![curve("fair", 1e-2, 0.0, 0.1, 0.1), short]);
         assert!(said.contains("short: no verdict: 2 of the 4 samples of each pixel"), "{said}");
-        assert!(said.contains("fair has the smallest error"), "{said}");
+        assert!(said.contains("fair has relMSE ") && !said.contains("smallest"), "{said}");
     }
 }

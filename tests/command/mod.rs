@@ -47,6 +47,22 @@ pub fn ball_under_sky() -> tempfile::TempDir {
     folder(&ball([24, 16], "[environment]\nradiance = 1\n[method]\ncache_samples = 200\n"))
 }
 
+/// A wall of 2 x 2 under a lamp from the left and one from the right; `more` stands between the wall and the right one.
+pub fn two_lamps(radiance: f64, more: &str) -> String {
+    let lamp = |name: &str, x: i32, half: f64, radiance: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nshape = \"rectangle\"\ncentre = [{x}, 0, 2]\nedge_u = [{half}, 0, {half}]\nedge_v = [0, {half}, 0]\n\
+             material = \"{name}\"\n[material.{name}]\ntype = \"emissive\"\nradiance = {radiance}\ntwo_sided = true\n"
+        )
+    };
+    let (left, right) = (lamp("left", -3, 0.5, 1e4), lamp("right", 3, 0.05, radiance));
+    format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 0, 9]\nlook_at = [0, 0, 0]\nfov = 10\nresolution = [64, 48]\n\
+         [[object]]\nshape = \"rectangle\"\ncentre = [0, 0, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 1, 0]\nmaterial = \"wall\"\n\
+         [material.wall]\ntype = \"diffuse\"\nalbedo = 0.5\n{left}{right}{more}"
+    )
+}
+
 /// A folder with `scene` as scene.toml.
 pub fn folder(scene: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
