@@ -80,8 +80,10 @@ impl Scene {
         let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath);
         for (number, what) in choice.beyond {
             let entry = &file.objects[number];
-            // What encloses nothing is not too thin besides.
-            if !models_or_paths || !scene.has(&scene.objects[number], ObstacleKind::Sheet) {
+            // An open sheet is not too thin besides.
+            let object = &scene.objects[number];
+            let open = object.findings.open_edges > 0 && scene.has(object, ObstacleKind::Sheet);
+            if !models_or_paths || !open {
                 said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
             }
         }

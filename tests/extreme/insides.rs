@@ -179,7 +179,7 @@ fn parts_of_a_mesh_that_touch_refused() {
 fn nested_parts_that_look_outwards_refused() {
     let core = cuboid([0.0; 3], [0.5; 3], 8, false);
     let scene = one(cube(0.0) + &core, WHITE);
-    refuses(&scene, ObstacleKind::Nested, &["\"a\"", "1 of its 2 parts lie inside another part", "cavities"]);
+    refuses(&scene, ObstacleKind::Nested, &["\"a\"", "1 of its 2 parts lies inside another part", "cavities"]);
 }
 
 /// White, and exp(-σ_a d) through what is solid of a box with a cavity.
