@@ -21,7 +21,7 @@ use marmor::query::{self, Backend};
 use marmor::render::{self, Job, Spent};
 use marmor::report::{Axis, COLOURS, DASHES, Figure, Panel, Row, Scale, Series, Stroke};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread, Surface};
+use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
 
 /// Pixels this far from the next one that misses the object are its interior.
 const INTERIOR: i64 = 3;
@@ -131,7 +131,7 @@ fn interior(view: View<'_>) -> Vec<bool> {
     let on = |x: i64, y: i64| {
         let ray = view.scene.camera.ray([x, y].map(|v| v as u32), [0.5; 2]);
         let hit = view.rays.closest(&ray);
-        hit.is_some_and(|h| !matches!(view.scene.surface(h.mesh), Surface::Emissive { .. }))
+        hit.is_some_and(|h| view.scene.surface(h.mesh).emission.is_none())
     };
     let hit: Vec<bool> = (0..width * height).map(|i| on(i % width, i / width)).collect();
     let at = |x: i64, y: i64| hit[(y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize];
@@ -276,7 +276,7 @@ fn stiff(seconds: f64) {
         let list = |v: [f64; 3]| v.map(|v| format!("{}", v * k)).join(", ");
         let (s, a) = (list([0.70, 1.22, 1.90]), list([0.0014, 0.0025, 0.0142]));
         let scene = scene(&format!("type = \"translucent\"\nsigma_s_prime = [{s}]\nsigma_a = [{a}]\neta = 1.3\n"));
-        let Surface::Translucent(t) = &scene.materials[scene.objects[0].material].surface else { continue };
+        let Some(t) = &scene.materials[scene.objects[0].material].surface.inside else { continue };
         let area = AreaTable::new(&scene.objects[0].mesh).unwrap().area();
         let stiffness = t.medium.sigma_tr().0.map(|s| area * f64::from(s).powi(2) / std::f64::consts::TAU);
         with_bench(&scene, |bench| {

@@ -9,7 +9,7 @@
 //! | 6 | [`cache`]: transmitted-light points of one pass and the estimators that gather over them |
 //! | 5 | [`light`]: light arriving at a surface point |
 //! | 4 | [`scene`]: the file as typed, and the checked world |
-//! | 3 | [`query`]: nearest hit · [`bssrdf`]: one file per model · [`film`]: sums, EXR, PNG, metrics |
+//! | 3 | [`query`]: nearest hit · [`bssrdf`]: one file per model · [`film`]: sums, EXR, PNG, metrics · [`surface`]: reflection and transmission |
 //! | 2 | [`geometry`]: meshes, area table · [`optics`]: Fresnel, media · [`sampling`]: Owen-Sobol streams |
 //! | 1 | [`math`], [`error`], [`memory`], [`input`], [`tally`], [`words`] |
 //!
@@ -37,6 +37,7 @@ pub mod render;
 pub mod report;
 pub mod sampling;
 pub mod scene;
+pub mod surface;
 pub mod tally;
 pub mod words;
 

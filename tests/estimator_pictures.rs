@@ -8,7 +8,7 @@ use marmor::integrator::{Subsurface, SubsurfaceOptions, View};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread, Surface};
+use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
 use std::sync::atomic::AtomicBool;
 
 /// Pixels across a block.
@@ -82,7 +82,7 @@ fn apart(view: View<'_>, all: &[Vec<f64>], estimator: Estimator, samples: u32, f
 
 fn set(scene: &mut Scene, model: ModelName) {
     for material in &mut scene.materials {
-        if let Surface::Translucent(t) = &mut material.surface {
+        if let Some(t) = &mut material.surface.inside {
             let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
             t.model = model;
             t.thickness = model.takes("thickness").then_some(10.0 * longest);

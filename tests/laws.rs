@@ -12,7 +12,7 @@ use marmor::optics::{reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread, Surface};
+use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
 use marmor::tally::Tally;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
@@ -189,7 +189,7 @@ const ESTIMATORS: [(Estimator, u32); 5] = [
 
 fn set_model(scene: &mut Scene, model: ModelName) {
     for material in &mut scene.materials {
-        if let Surface::Translucent(t) = &mut material.surface {
+        if let Some(t) = &mut material.surface.inside {
             t.model = model;
             // Some four mean free paths of the thinnest channel: a slab that every medium here allows.
             let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
@@ -314,7 +314,7 @@ fn law_3_energy_furnaces_are_one() {
             s.wax("wax", [4.0, 3.0, 2.0], [0.75, 1.0, 1.25], &format!("model = \"{}\"\nthickness = 0.6", model.name()));
             s.text += "[environment]\nradiance = 1\n";
             let scene = s.load();
-            let Surface::Translucent(t) = &scene.materials[0].surface else { panic!("not wax") };
+            let Some(t) = &scene.materials[0].surface.inside else { panic!("not wax") };
             let built = t.build().unwrap();
             let (mut total, claims) = (built.total(), built.claims());
             let mut found_by_quadrature = furnace_by_quadrature(&*built, 1.3);
@@ -412,8 +412,8 @@ fn law_5_honesty_every_sample_is_kept_or_counted() {
         for (name, mut scene) in scenes(1.0, [0.0; 3]) {
             // Enough light for some products to leave single precision, and some not.
             for material in &mut scene.materials {
-                if let Surface::Emissive { radiance, .. } = &mut material.surface {
-                    *radiance = Rgb::splat(2e38);
+                if let Some(emission) = &mut material.surface.emission {
+                    emission.radiance = Rgb::splat(2e38);
                 }
             }
             for (method, film) in films(&mut scene, backend, 0..2, 0.5) {

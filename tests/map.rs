@@ -16,6 +16,7 @@ const ROWS: &[(&str, u32)] = &[
     ("query", 3),
     ("bssrdf", 3),
     ("film", 3),
+    ("surface", 3),
     ("geometry", 2),
     ("optics", 2),
     ("sampling", 2),

@@ -3,7 +3,7 @@
 
 mod refusals;
 
-use marmor::scene::{Scene, SceneFile, Surface};
+use marmor::scene::{Scene, SceneFile};
 use marmor::{Error, ErrorKind};
 use refusals::{damaged, failure};
 use std::path::Path;
@@ -53,7 +53,7 @@ fn a_good_file_loads_without_a_word() {
     assert_eq!(scene.meshes().len(), 2);
     assert_eq!(scene.default_method().name(), "subsurface");
     assert_eq!(scene.unit_in_mm, Some(1.0));
-    let Surface::Translucent(stone) = scene.surface(0) else { panic!("not translucent") };
+    let Some(stone) = &scene.surface(0).inside else { panic!("not translucent") };
     assert_eq!((stone.medium.sigma_s.0, stone.medium.g, stone.medium.eta), ([2.0, 3.0, 4.0], 0.0, 1.5));
 }
 
@@ -181,10 +181,7 @@ fn overrides_replace_add_and_complain_as_themselves() {
 
 #[test]
 fn coefficients_come_out_per_scene_unit() {
-    let medium = |text: &str| match parse(text).unwrap().materials[0].surface.clone() {
-        Surface::Translucent(t) => t.medium,
-        _ => panic!("not translucent"),
-    };
+    let medium = |text: &str| parse(text).unwrap().materials[0].surface.inside.as_ref().unwrap().medium;
     let per_mm = medium(&GOOD.replacen("eta = 1.5", "eta = 1.5\nper = \"mm\"", 1).replacen("\"mm\"", "\"cm\"", 1));
     assert_eq!(per_mm.sigma_s.0, [20.0, 30.0, 40.0]);
     let preset = GOOD.replacen("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01\neta = 1.5", "preset = \"marble\"", 1);

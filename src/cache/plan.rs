@@ -12,7 +12,7 @@ use crate::light::Lights;
 use crate::math::Rgb;
 use crate::optics::Medium;
 use crate::sampling::{CacheStream, Points, Turn};
-use crate::scene::{EntrySampling, Estimator, Scene, Spread, Surface, View};
+use crate::scene::{EntrySampling, Estimator, Scene, Spread, View};
 use crate::tally::{Clock, Tally};
 use std::sync::OnceLock;
 
@@ -93,7 +93,7 @@ impl Plan {
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, lights: &Lights, object: u32, options: SubsurfaceOptions) -> Result<Option<Self>> {
         let mesh = &scene.objects[object as usize].mesh;
-        let (Surface::Translucent(t), Some(table)) = (scene.surface(object), AreaTable::new(mesh)) else {
+        let (Some(t), Some(table)) = (&scene.surface(object).inside, AreaTable::new(mesh)) else {
             return Ok(None);
         };
         let model = t.build()?;

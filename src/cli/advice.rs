@@ -6,7 +6,7 @@ use marmor::bssrdf::{Unmeasured, measured_albedos};
 use marmor::film::Window;
 use marmor::integrator::{LocalShape, ModelOnBody, TOLERANCE, Trustworthiness, Verdict, View};
 use marmor::render::{Aim, nothing_in_view, shares};
-use marmor::scene::{Scene, Surface};
+use marmor::scene::Scene;
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 
@@ -230,7 +230,7 @@ impl<'a> Advice<'a> {
                 false => format!("{key} = {value} in the section of material {name:?}"),
             }
         };
-        let translucent = |m: &&marmor::scene::Material| matches!(m.surface, Surface::Translucent(_));
+        let translucent = |m: &&marmor::scene::Material| m.surface.is_translucent();
         let alone = self.prepared.scene.materials.iter().filter(translucent).count() == 1;
         let for_all = alone || self.prepared.file.method.model.is_some();
         let mut words = vec![if for_all { format!("--model {}", model.model) } else { set("model", model.model) }];
@@ -313,7 +313,7 @@ fn trace(t: &Trustworthiness, what_for: &str) -> Option<String> {
 
 /// Numbers of the translucent objects.
 fn translucent(scene: &Scene) -> Vec<u32> {
-    let is = |object: &u32| matches!(scene.surface(*object), Surface::Translucent(_));
+    let is = |object: &u32| scene.surface(*object).is_translucent();
     (0..scene.objects.len() as u32).filter(is).collect()
 }
 

@@ -10,7 +10,7 @@ use marmor::geometry::{Mended, load_obj, mended, write_obj};
 use marmor::integrator::{TOLERANCE, View};
 use marmor::optics::{ChannelOptics, Medium};
 use marmor::query;
-use marmor::scene::{Geometry, Object, Scene, Surface};
+use marmor::scene::{Emission, Geometry, Object, Scene, Surface};
 use marmor::words::{albedo, counted, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -136,7 +136,7 @@ fn tell(scene: &Scene, object: &Object, share: f64) {
         material.name,
         describe(&material.surface).join("\n    ")
     );
-    if let Surface::Translucent(t) = &material.surface {
+    if let Some(t) = &material.surface.inside {
         odd_size(&t.medium, size).iter().for_each(|note| println!("    note: {note}"));
     }
     for remark in scene.remarks(object).iter().filter(|r| !r.warns) {
@@ -228,11 +228,11 @@ impl Extent {
 /// The kind of a surface, and its numbers.
 fn describe(surface: &Surface) -> Vec<String> {
     match surface {
-        Surface::Diffuse { albedo } => vec![format!("diffuse, albedo {:?}", albedo.0)],
-        Surface::Emissive { radiance, two_sided } => {
+        Surface { emission: Some(Emission { radiance, two_sided }), .. } => {
             vec![format!("emissive, radiance {:?}{}", radiance.0, if *two_sided { ", two-sided" } else { "" })]
         }
-        Surface::Translucent(t) => {
+        Surface { inside: None, bsdf, .. } => vec![bsdf.text()],
+        Surface { inside: Some(t), .. } => {
             let free_path = t.medium.sigma_t_prime().map(|s| 1.0 / s);
             vec![
                 format!("translucent, {}, model {}", t.source, t.model_text()),

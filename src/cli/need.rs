@@ -58,9 +58,9 @@ pub fn of(prepared: &Prepared, window: Window, view: Option<View<'_>>) -> Need {
         Backend::Embree => (70, 110),
     };
     let table = |o: &marmor::scene::Object| match scene.materials[o.material].surface {
-        Surface::Diffuse { .. } => 0,
-        Surface::Emissive { .. } => 12 * triangles(o),
-        Surface::Translucent(_) => prepared.method.bytes_per_triangle() * triangles(o) + (1 << 20),
+        Surface { emission: Some(_), .. } => 12 * triangles(o),
+        Surface { inside: None, .. } => 0,
+        Surface { .. } => prepared.method.bytes_per_triangle() * triangles(o) + (1 << 20),
     };
     let tables: u64 = scene.objects.iter().map(table).sum();
     let sky = scene.environment.image.as_ref().map_or(0, |image| image.pixels.len() as u64);
@@ -85,7 +85,7 @@ pub fn of(prepared: &Prepared, window: Window, view: Option<View<'_>>) -> Need {
             }
             _ => 0,
         };
-        let translucent = looks_inside && matches!(scene.materials[o.material].surface, Surface::Translucent(_));
+        let translucent = looks_inside && scene.materials[o.material].surface.is_translucent();
         read.max(faces * if translucent { LOOKING_INSIDE } else { LOOKING })
     });
     let rendering = need.film + need.pictures + need.trees + need.pass;

@@ -9,7 +9,7 @@ use marmor::query::Backend;
 use marmor::render::{self, Job, Observer, Outcome};
 use marmor::sampling::Points;
 use marmor::scene::{
-    EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, Surface, default_photons,
+    EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, default_photons,
 };
 use marmor::{Error, Result};
 use std::path::Path;
@@ -142,15 +142,8 @@ impl Prepared {
     pub fn describe(&self) -> String {
         match self.method {
             Method::Subsurface(_) => {
-                let models: Vec<&str> = self
-                    .scene
-                    .materials
-                    .iter()
-                    .filter_map(|m| match &m.surface {
-                        Surface::Translucent(t) => Some(t.model.name()),
-                        _ => None,
-                    })
-                    .collect();
+                let models: Vec<&str> =
+                    self.scene.materials.iter().filter_map(|m| Some(m.surface.inside.as_ref()?.model.name())).collect();
                 let how = if self.as_notes { "as_notes" } else { self.estimator.name() };
                 format!("{} ({how}, {})", self.method.name(), models.join(", "))
             }
@@ -165,10 +158,7 @@ impl Prepared {
             .scene
             .materials
             .iter()
-            .filter_map(|m| match &m.surface {
-                Surface::Translucent(t) => Some(format!("{}: {}", m.name, t.model_text())),
-                _ => None,
-            })
+            .filter_map(|m| Some(format!("{}: {}", m.name, m.surface.inside.as_ref()?.model_text())))
             .collect();
         vec![
             ("model", models.join(", ")),
@@ -183,7 +173,7 @@ pub fn prepare(file: SceneFile, args: &MethodArgs) -> Result<Prepared> {
     let mut scene = Scene::load_with(&file, args.repair)?;
     if args.as_notes {
         for material in &mut scene.materials {
-            if let Surface::Translucent(t) = &mut material.surface {
+            if let Some(t) = &mut material.surface.inside {
                 t.exit_normalisation = false;
             }
         }

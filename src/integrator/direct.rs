@@ -30,10 +30,9 @@ impl Direct {
 /// The Lambertian albedo that stands for each object's surface.
 pub(super) fn lambertian_albedos(scene: &Scene) -> Result<Vec<Rgb>> {
     let albedo = |surface: &Surface| {
-        Ok(match surface {
-            Surface::Diffuse { albedo } => *albedo,
-            Surface::Emissive { .. } => Rgb::BLACK,
-            Surface::Translucent(t) => t.build()?.total(),
+        Ok(match &surface.inside {
+            Some(t) => t.build()?.total(),
+            None => surface.bsdf.albedo(),
         })
     };
     scene.objects.iter().map(|o| albedo(&scene.materials[o.material].surface)).collect()
@@ -69,8 +68,7 @@ impl Integrator for Direct {
             "any-hit shadow rays",
             format!("{} per camera ray and kind of light", self.light.samples),
         ));
-        let translucent =
-            scene.objects.iter().any(|o| matches!(scene.materials[o.material].surface, Surface::Translucent(_)));
+        let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
         let why = if translucent {
             "`direct` shows translucent surfaces as Lambertian ones of the same reflectance"
         } else {

@@ -6,7 +6,7 @@ use crate::geometry::SurfacePoint;
 use crate::math::{Frame, Vec3};
 use crate::optics::{ChannelOptics, Medium};
 use crate::query::Ray;
-use crate::scene::{Scene, Surface, Translucent};
+use crate::scene::{Scene, Translucent};
 
 /// A translucent object: what decides how far models can be trusted on it.
 pub struct LocalShape {
@@ -77,7 +77,7 @@ const AROUND: u32 = 6;
 impl LocalShape {
     /// Of object number `object`; `None` where it is not translucent or nothing in it scatters or absorbs.
     pub fn new(scene: &Scene, object: u32) -> Option<Self> {
-        let Surface::Translucent(t) = scene.surface(object) else { return None };
+        let Some(t) = &scene.surface(object).inside else { return None };
         let shape = Self { object, medium: t.medium, optics: ChannelOptics::of(&t.medium), own: Candidate::of(t) };
         (shape.longest_path() > 0.0).then_some(shape)
     }

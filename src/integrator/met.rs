@@ -2,7 +2,7 @@
 
 use super::Tally;
 use crate::light::{CountedLight, Lights};
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 use crate::tally::LIGHTS;
 
 /// Times that a light must have come before the render can tell its own error: some tens, for the spread of fewer is
@@ -30,7 +30,7 @@ impl KnownLights {
 
     /// The same, for a method whose paths also meet them through clear bodies and on mirrors.
     pub fn met(scene: &Scene, lights: &Lights) -> Self {
-        let body = |o: &crate::scene::Object| matches!(scene.materials[o.material].surface, Surface::Translucent(_));
+        let body = |o: &crate::scene::Object| scene.materials[o.material].surface.is_translucent();
         Self { lights: lights.counted(scene), by_chance: scene.objects.iter().any(body) }
     }
 

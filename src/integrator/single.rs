@@ -5,7 +5,7 @@ use super::{CameraRay, View};
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::query::Hit;
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 use crate::tally::Tally;
 
 /// The first order of the objects whose models leave it out: a distance along the refracted ray of the camera, then light
@@ -20,8 +20,8 @@ impl Single {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, seed: u64) -> Result<Option<Self>> {
-        let wanted = |object: &crate::scene::Object| match &scene.materials[object.material].surface {
-            Surface::Translucent(t) => t.build().map(|model| !model.claims().first_order),
+        let wanted = |object: &crate::scene::Object| match &scene.materials[object.material].surface.inside {
+            Some(t) => t.build().map(|model| !model.claims().first_order),
             _ => Ok(false),
         };
         let wanted: Vec<bool> = scene.objects.iter().map(wanted).collect::<Result<_>>()?;

@@ -15,7 +15,7 @@ use crate::memory;
 use crate::optics::{reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{EntrySampling, Scene, Surface, View};
+use crate::scene::{EntrySampling, Scene, View};
 use crate::tally::{Clock, Tally};
 use std::sync::Once;
 
@@ -45,7 +45,7 @@ impl Subsurface {
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Result<Self> {
         let objects = 0..scene.objects.len() as u32;
-        let translucent = |o: &u32| matches!(scene.surface(*o), Surface::Translucent(_));
+        let translucent = |o: &u32| scene.surface(*o).is_translucent();
         let samples = objects.clone().filter(translucent).count() as u64 * u64::from(options.cache_samples);
         let what = format!("the cache of {samples} samples a pass");
         let needed = u128::from(samples) * BYTES_PER_SAMPLE;

@@ -5,7 +5,7 @@ use super::local::{Candidate, Local, LocalShape};
 use crate::bssrdf::{ExpectedError, ModelName, Place, Unmeasured, expected_error};
 use crate::geometry::Mesh;
 use crate::optics::FresnelMoments;
-use crate::scene::{ObstacleKind, Surface, Translucent};
+use crate::scene::{ObstacleKind, Translucent};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -115,7 +115,7 @@ impl Trustworthiness {
     /// Of the object of `shape`, where wrong is what is wrong by more than `tolerance`; `None` without area.
     pub fn new(view: View<'_>, shape: &LocalShape, tolerance: f64) -> Option<Self> {
         let object = &view.scene.objects[shape.object as usize];
-        let Surface::Translucent(material) = view.scene.surface(shape.object) else { return None };
+        let Some(material) = &view.scene.surface(shape.object).inside else { return None };
         let places = spread(&object.mesh, POINTS);
         if places.is_empty() {
             return None;

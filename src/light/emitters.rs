@@ -5,7 +5,7 @@ use crate::geometry::{AreaTable, SurfacePoint};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
-use crate::scene::{Scene, Surface};
+use crate::scene::{Emission, Scene};
 use std::f32::consts::PI;
 
 /// A lamp of this share of its area and that of a disk with its distance as radius: from there on the cosine has less noise
@@ -41,7 +41,7 @@ impl Lights {
         let mut cumulative = Vec::new();
         let mut power = 0.0;
         for (object, o) in scene.objects.iter().enumerate() {
-            let Surface::Emissive { radiance, two_sided } = scene.materials[o.material].surface else { continue };
+            let Some(Emission { radiance, two_sided }) = scene.materials[o.material].surface.emission else { continue };
             if radiance.is_black() {
                 continue;
             }

@@ -8,7 +8,7 @@ mod suns;
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 use crate::query::{Hit, Ray};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Emission, Scene};
 pub use emitters::Lights;
 pub use sky::{Sky, SunDirection};
 
@@ -68,7 +68,7 @@ impl LampPoint {
 /// Radiance that the surface at `hit` sends back along a ray with direction `towards` of its own, by emission.
 #[inline]
 pub fn emitted(scene: &Scene, hit: &Hit, towards: Vec3) -> Rgb {
-    let Surface::Emissive { radiance, two_sided } = scene.surface(hit.mesh) else { return Rgb::BLACK };
+    let Some(Emission { radiance, two_sided }) = scene.surface(hit.mesh).emission else { return Rgb::BLACK };
     let n = scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
-    if *two_sided || n.dot(towards) < 0.0 { *radiance } else { Rgb::BLACK }
+    if two_sided || n.dot(towards) < 0.0 { radiance } else { Rgb::BLACK }
 }

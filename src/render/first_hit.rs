@@ -55,7 +55,7 @@ pub fn first_hit(view: View<'_>, window: Window, what: Seen) -> Image {
             Seen::Depth => Some(Rgb::splat((ray.direction * hit.t).dot(camera.forward()))),
             Seen::Translucent => {
                 let object = &view.scene.objects[hit.mesh as usize];
-                let translucent = matches!(view.scene.materials[object.material].surface, Surface::Translucent(_));
+                let translucent = view.scene.materials[object.material].surface.is_translucent();
                 translucent.then(|| Rgb::splat(1.0))
             }
             Seen::Validity => Some(validity(view, shapes[hit.mesh as usize].as_ref()?, &hit)),
@@ -119,9 +119,8 @@ fn validity(view: View<'_>, (shape, curvature): &Bent, hit: &Hit) -> Rgb {
 
 fn albedos(scene: &Scene) -> Vec<Rgb> {
     let of = |object: &crate::scene::Object| match &scene.materials[object.material].surface {
-        Surface::Diffuse { albedo } => *albedo,
-        Surface::Emissive { .. } => Rgb::BLACK,
-        Surface::Translucent(t) => {
+        Surface { inside: None, bsdf, .. } => bsdf.albedo(),
+        Surface { inside: Some(t), .. } => {
             let (half_space, optics) = (HalfSpace::new(t.medium.eta.into()), ChannelOptics::of(&t.medium));
             Rgb::from_fn(|c| half_space.reflectance(optics[c].absorbed_prime) as f32)
         }

@@ -101,9 +101,9 @@ fn is_cut(triangle: [DVec3; 3], planes: &[DVec3; 5]) -> bool {
 fn aim(view: View<'_>) -> Option<Aim> {
     let scene = view.scene;
     let rank = |object: &&Object| match scene.materials[object.material].surface {
-        Surface::Translucent(_) => 0,
-        Surface::Diffuse { .. } => 1,
-        Surface::Emissive { .. } => 2,
+        Surface { inside: Some(_), .. } => 0,
+        Surface { emission: None, .. } => 1,
+        _ => 2,
     };
     let object = scene.objects.iter().filter(|o| o.mesh.bounds().is_some()).min_by_key(rank)?;
     let (lo, hi) = object.mesh.bounds()?;

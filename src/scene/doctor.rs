@@ -21,9 +21,9 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
     let (found, mut remarks) = (&object.findings, Vec::new());
     let mut say = |warns: bool, text: String| remarks.push(Remark { text, warns });
     let all = counted(found.triangles, "triangle", "triangles");
-    let translucent = matches!(surface, Surface::Translucent(_));
-    let emissive = matches!(surface, Surface::Emissive { .. });
-    let one_sided = translucent || matches!(surface, Surface::Emissive { two_sided: false, .. });
+    let translucent = surface.is_translucent();
+    let emissive = surface.emission.is_some();
+    let one_sided = translucent || surface.emission.is_some_and(|e| !e.two_sided);
     if emissive && found.zero_area == found.triangles {
         let have = if found.triangles == 1 { "its one triangle has".into() } else { format!("all {all} have") };
         say(true, format!("{have} no area: it sends out no light"));

@@ -35,8 +35,7 @@ impl Scene {
         let folder = file.path.parent().unwrap_or(Path::new(""));
         let environment = file.environment.load(folder, &mut said)?;
         let placed = meshes(file, folder, repair, &mut said)?;
-        let translucent =
-            |entry: &ObjectEntry| matches!(file.materials[entry.material].surface, Surface::Translucent(_));
+        let translucent = |entry: &ObjectEntry| file.materials[entry.material].surface.is_translucent();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| translucent(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
         let mut objects = Vec::with_capacity(placed.len());
@@ -98,9 +97,9 @@ impl Scene {
     /// is light, else ambient occlusion.
     pub fn default_method(&self) -> MethodName {
         let any = |test: fn(&Surface) -> bool| self.objects.iter().any(|o| test(&self.materials[o.material].surface));
-        if any(|s| matches!(s, Surface::Translucent(_))) {
+        if any(Surface::is_translucent) {
             MethodName::Subsurface
-        } else if !self.environment.is_black() || any(|s| matches!(s, Surface::Emissive { .. })) {
+        } else if !self.environment.is_black() || any(|s| s.emission.is_some()) {
             MethodName::Direct
         } else {
             MethodName::AmbientOcclusion
@@ -250,7 +249,7 @@ fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {
 fn materials(file: &SceneFile) -> Vec<Material> {
     let made = file.materials.iter().map(|m| {
         let mut surface = m.surface.clone();
-        if let (Surface::Translucent(t), Some(model)) = (&mut surface, file.method.model) {
+        if let (Some(t), Some(model)) = (&mut surface.inside, file.method.model) {
             t.model = model;
         }
         Material { name: m.name.clone(), surface }

@@ -2,7 +2,7 @@
 
 use super::file::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
 use super::tree::{Fields, Node};
-use super::{Surface, Translucent};
+use super::{Emission, Surface, Translucent};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
@@ -36,12 +36,13 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
                 m.only("a diffuse material", &["type", "albedo"])?;
                 let expected = "one number or three from 0 to 1";
                 let albedo = m.need("albedo", expected, |n| colour(n, |v| (0.0..=1.0).contains(&v)))?;
-                Surface::Diffuse { albedo: rgb(albedo) }
+                Surface::diffuse(rgb(albedo))
             }
             "emissive" => {
                 m.only("an emissive material", &["type", "radiance", "two_sided"])?;
                 let radiance = m.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0))?;
-                Surface::Emissive { radiance: rgb(radiance), two_sided: switch(&m, "two_sided")?.unwrap_or(false) }
+                let two_sided = switch(&m, "two_sided")?.unwrap_or(false);
+                Surface::emissive(Emission { radiance: rgb(radiance), two_sided })
             }
             "dielectric" | "mirror" => {
                 let what = format!("{kind:?} is not built yet; there are {}", KINDS.join(", "));
@@ -95,7 +96,7 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
         source,
     };
     translucent.build().map_err(|e| m.error(e.to_string()))?;
-    Ok(Surface::Translucent(translucent))
+    Ok(Surface::translucent(translucent))
 }
 
 fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64) -> Result<(Medium, String)> {

@@ -35,4 +35,4 @@ pub use options::{
     EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
 };
 pub use view::View;
-pub use world::{Material, Object, Scene, Surface, Translucent};
+pub use world::{Emission, Material, Object, Scene, Surface, Translucent};

@@ -1,7 +1,7 @@
 //! What stands in the way of knowing which medium is where: bodies in one another, surfaces that touch, meshes without an inside, lamps
 //! and cameras in media. Read first: [`Obstacle`] and [`Found::new`]; docs/robustness.md has the table.
 
-use super::{Object, Obstacle, ObstacleKind, Scene, Surface};
+use super::{Object, Obstacle, ObstacleKind, Scene};
 use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, meeting, mended};
 use crate::math::DVec3;
 use crate::words::{self, counted, either, percent};
@@ -63,8 +63,8 @@ impl Found {
     /// Looks at every translucent object, alone and with all that comes near it; at nothing else.
     pub(super) fn new(scene: &Scene) -> Self {
         let role = |o: &Object| match &scene.materials[o.material].surface {
-            Surface::Translucent(_) => Role::Medium,
-            Surface::Emissive { radiance, .. } if !radiance.is_black() => Role::Lamp,
+            surface if surface.is_translucent() => Role::Medium,
+            surface if surface.shines() => Role::Lamp,
             _ => Role::Opaque,
         };
         let all: Vec<_> =

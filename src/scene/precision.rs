@@ -41,7 +41,7 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
     let offsets: Vec<f64> = objects
         .iter()
         .map(|o| match materials[o.material].surface {
-            Surface::Emissive { .. } => 0.0,
+            Surface { emission: Some(_), .. } => 0.0,
             _ => o.mesh.bounds().map_or(0.0, |(lo, hi)| Precision::Single.error(lo.abs().max(hi.abs()).max_element())),
         })
         .collect();
@@ -62,7 +62,7 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         }
     }
     for (number, object) in objects.iter().enumerate() {
-        let Surface::Translucent(t) = &materials[object.material].surface else { continue };
+        let Some(t) = &materials[object.material].surface.inside else { continue };
         let (other, farthest) = worst.iter().find(|w| w.0 != number).copied().unwrap_or((number, 0.0));
         let Some(probes) = probes(object, farthest / CONTACT) else { continue };
         let name = &object.name;

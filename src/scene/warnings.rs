@@ -2,7 +2,7 @@
 
 use super::file::SceneFile;
 use super::options::MethodName;
-use super::{ObstacleKind, Scene, Surface, Translucent, energy};
+use super::{ObstacleKind, Scene, Translucent, energy};
 use crate::optics::{ChannelOptics, Trust};
 use crate::words::{albedo, short};
 
@@ -27,7 +27,7 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         let head = format!("{}: material {:?}", entry.at, entry.name);
         if !used[i] {
             said.push(format!("{head} is used by no object"));
-        } else if let Surface::Translucent(t) = &scene.materials[i].surface {
+        } else if let Some(t) = &scene.materials[i].surface.inside {
             let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
             let model = models_are_used(file).then(|| outside_diffusion(t).into_iter().chain(first));
             let all = nothing_there(t).into_iter().chain(model.into_iter().flatten());
@@ -85,7 +85,7 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         let head = format!("{}: object {:?}", entry.at, entry.name);
         let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
         said.extend(found.map(|what| format!("{head}: {what}")));
-        if let Surface::Translucent(t) = &scene.materials[object.material].surface
+        if let Some(t) = &scene.materials[object.material].surface.inside
             && let Some((lo, hi)) = object.mesh.bounds()
         {
             // Of a body that light hardly meets no model need be spoken.

@@ -6,6 +6,8 @@ use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
+use crate::surface::{Boundary, Bsdf, Lambertian};
+use std::sync::Arc;
 
 /// A scene whose numbers have been checked.
 pub struct Scene {
@@ -46,32 +48,65 @@ pub struct Object {
     pub findings: Findings,
 }
 
-/// What a surface does to light.
+/// A surface by name.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Name in the scene file.
     pub name: String,
-    /// The kind and its numbers.
+    /// What it does with light.
     pub surface: Surface,
 }
 
-/// Kinds of surface.
+/// What a surface does with light: what it reflects and lets through, what it sends out, what is behind it.
 #[derive(Clone, Debug)]
-pub enum Surface {
+pub struct Surface {
+    /// Reflection and transmission.
+    pub bsdf: Arc<dyn Bsdf>,
+    /// What it sends out; of a lamp.
+    pub emission: Option<Emission>,
+    /// The scattering medium where the outward normal does not point; of a translucent body.
+    pub inside: Option<Translucent>,
+}
+
+/// Constant radiance of a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Emission {
+    /// Radiance [same unit as the environment].
+    pub radiance: Rgb,
+    /// Both faces shine, not only the outward one.
+    pub two_sided: bool,
+}
+
+impl Surface {
     /// Lambertian, both sides alike; `albedo` in [0, 1].
-    Diffuse {
-        /// Reflected over incident flux.
-        albedo: Rgb,
-    },
-    /// Sends out constant radiance, reflects nothing.
-    Emissive {
-        /// Radiance [same unit as the environment].
-        radiance: Rgb,
-        /// Both faces shine, not only the outward one.
-        two_sided: bool,
-    },
+    pub fn diffuse(albedo: Rgb) -> Self {
+        Self { bsdf: Arc::new(Lambertian { albedo }), emission: None, inside: None }
+    }
+
+    /// A lamp, which reflects nothing.
+    pub fn emissive(emission: Emission) -> Self {
+        Self { bsdf: Arc::new(Lambertian::BLACK), emission: Some(emission), inside: None }
+    }
+
     /// A scattering medium behind a smooth boundary.
-    Translucent(Translucent),
+    pub fn translucent(inside: Translucent) -> Self {
+        Self { bsdf: Arc::new(Boundary { eta: inside.medium.eta }), emission: None, inside: Some(inside) }
+    }
+
+    /// Whether light goes in.
+    pub fn is_translucent(&self) -> bool {
+        self.inside.is_some()
+    }
+
+    /// Whether it is neither a lamp nor the boundary of a body.
+    pub fn is_opaque(&self) -> bool {
+        self.emission.is_none() && self.inside.is_none()
+    }
+
+    /// Whether it sends out any light.
+    pub fn shines(&self) -> bool {
+        self.emission.is_some_and(|e| !e.radiance.is_black())
+    }
 }
 
 /// A medium and the model asked for it.
@@ -112,10 +147,7 @@ impl Scene {
 
     /// Whether nothing sends out light: no emissive object, no environment.
     pub fn is_dark(&self) -> bool {
-        let shines = |o: &Object| match &self.materials[o.material].surface {
-            Surface::Emissive { radiance, .. } => !radiance.is_black(),
-            _ => false,
-        };
+        let shines = |o: &Object| self.materials[o.material].surface.shines();
         self.environment.is_black() && !self.objects.iter().any(shines)
     }
 

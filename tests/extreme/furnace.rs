@@ -8,7 +8,7 @@ use marmor::integrator::{Subsurface, SubsurfaceOptions, VolumePath, VolumePathOp
 use marmor::math::{DVec3, GaussLegendre, Rgb, Vec3};
 use marmor::optics::{Medium, transmittance};
 use marmor::query::{self, Backend, Hit, Ray};
-use marmor::scene::{Estimator, Orders, Scene, SceneFile, Spread, Surface, Translucent};
+use marmor::scene::{Estimator, Orders, Scene, SceneFile, Spread, Translucent};
 use std::path::Path;
 
 /// The ball with the medium of `text`, a scene of this folder, and a model.
@@ -25,11 +25,7 @@ pub fn scene(text: &str, model: &str) -> Option<Scene> {
 }
 
 pub fn translucent(scene: &Scene) -> &Translucent {
-    let body = scene.objects.iter().find_map(|o| match &scene.materials[o.material].surface {
-        Surface::Translucent(t) => Some(t),
-        _ => None,
-    });
-    body.unwrap()
+    scene.objects.iter().find_map(|o| scene.materials[o.material].surface.inside.as_ref()).unwrap()
 }
 
 /// A mean per channel and its standard error.
@@ -237,7 +233,7 @@ pub fn of_paths(text: &str, passes: u32) {
     for clear in [false, true] {
         if clear {
             for material in &mut scene.materials {
-                if let Surface::Translucent(t) = &mut material.surface {
+                if let Some(t) = &mut material.surface.inside {
                     t.medium.sigma_a = Rgb::BLACK;
                 }
             }

@@ -100,7 +100,7 @@ impl Body {
                 material: 0,
                 findings: Findings::default(),
             }],
-            materials: vec![Material { name: "body".into(), surface: Surface::Translucent(translucent) }],
+            materials: vec![Material { name: "body".into(), surface: Surface::translucent(translucent) }],
             environment: Rgb::BLACK.into(),
             why_double: None,
             warnings: Vec::new(),

@@ -166,9 +166,9 @@ impl Body {
             return if at.n_geometric.dot(w) > 0.0 { Flight::Boundary(at, hit.t) } else { Flight::Lost(self.leak) };
         }
         match &view.scene.materials[object.material].surface {
-            Surface::Diffuse { albedo } => Flight::Opaque(at.facing(-w), hit.t, *albedo),
-            Surface::Emissive { .. } => Flight::Lamp(hit),
-            Surface::Translucent(_) => Flight::Lost(Cause::OtherMedium),
+            Surface { emission: Some(_), .. } => Flight::Lamp(hit),
+            Surface { inside: Some(_), .. } => Flight::Lost(Cause::OtherMedium),
+            Surface { bsdf, .. } => Flight::Opaque(at.facing(-w), hit.t, bsdf.albedo()),
         }
     }
 

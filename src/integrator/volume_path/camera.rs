@@ -146,18 +146,18 @@ impl<'a> CameraPath<'a> {
     fn meet(&mut self, hit: &Hit, direction: Vec3) -> Option<Ray> {
         let at = self.view.point(hit, direction);
         match self.view.scene.surface(hit.mesh) {
-            Surface::Emissive { .. } => {
+            Surface { emission: Some(_), .. } => {
                 if self.meets_lamps {
                     let share = self.direct * self.share(hit, direction);
                     self.add_lamp(hit, direction, share);
                 }
                 None
             }
-            Surface::Diffuse { albedo } => {
+            Surface { inside: None, bsdf, .. } => {
                 self.left = None;
-                self.diffuse(&at, *albedo)
+                self.diffuse(&at, bsdf.albedo())
             }
-            Surface::Translucent(_) => {
+            Surface { .. } => {
                 self.left = None;
                 self.direct = self.other;
                 let body = self.method.bodies[hit.mesh as usize].as_ref()?;

@@ -91,8 +91,7 @@ impl VolumePath {
             scatters.then(|| Source::new(scene, body, &lights, options.photons, reach, options.seed)).flatten()
         };
         let sources = bodies.iter().map(source).collect();
-        let diffuse =
-            scene.objects.iter().any(|o| matches!(scene.materials[o.material].surface, Surface::Diffuse { .. }));
+        let diffuse = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_opaque());
         let least: f32 = if diffuse { 0.5 } else { 0.25 };
         // Of an environment, what is beside suns is met by paths that go on.
         let beside = if lights.has_environment() { lights.share_beside_suns() } else { 0.0 };
@@ -114,7 +113,9 @@ impl VolumePath {
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
         match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
             (Some(body), _) => both_parts(&mut path, body, hit, direction),
-            (None, Surface::Emissive { .. }) => path.radiance = self.of_order_0(emitted(view.scene, hit, direction)),
+            (None, Surface { emission: Some(_), .. }) => {
+                path.radiance = self.of_order_0(emitted(view.scene, hit, direction))
+            }
             _ => path.resume(hit, direction),
         }
         path.radiance
@@ -206,7 +207,7 @@ impl VolumePath {
 /// The body of object number `index`, where it is translucent and has a size.
 fn body(scene: &Scene, lights: &Lights, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
-    let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
+    let Some(t) = &scene.materials[object.material].surface.inside else { return None };
     let (lo, hi) = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, lo, hi, cells);

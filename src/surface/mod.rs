@@ -1,0 +1,45 @@
+//! What a surface does with light that meets it, in the field's terms. Not for: what shines by itself (`light`), what happens
+//! inside a body (`integrator/volume_path`). Read first: [`Bsdf`]; each kind is one file.
+
+mod boundary;
+mod lambertian;
+
+use crate::geometry::SurfacePoint;
+use crate::math::{Rgb, Vec3};
+pub use boundary::Boundary;
+pub use lambertian::Lambertian;
+
+/// Reflection and transmission at a point of a surface. Directions are unit vectors that lead away from it: `wo` to where light
+/// goes, `wi` to where it comes from.
+pub trait Bsdf: Send + Sync + std::fmt::Debug {
+    /// f [1/sr], without the cosine at `wi`; black for light of a delta function.
+    fn eval(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> Rgb;
+
+    /// A direction of light that goes on to `wo`, from numbers in [0, 1); `None` where there is none.
+    fn sample(&self, at: &SurfacePoint, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample>;
+
+    /// Density of `wi` [1/sr] by [`Self::sample`]; 0 for delta functions.
+    fn pdf(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> f32;
+
+    /// Whether all of it is delta functions, so that lights cannot be asked for.
+    fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// Share of even light that comes back from outside, in [0, 1]; black of what reflects nothing.
+    fn albedo(&self) -> Rgb;
+
+    /// What `check` says of it.
+    fn text(&self) -> String;
+}
+
+/// A sampled direction.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// Unit direction of the light, away from the surface.
+    pub wi: Vec3,
+    /// f cosθ / pdf, each channel in [0, 1].
+    pub weight: Rgb,
+    /// Density [1/sr]; 0 of a delta function.
+    pub pdf: f32,
+}
