@@ -10,7 +10,7 @@ use marmor::film::{
 };
 use marmor::integrator::{Tally, View};
 use marmor::query::{self, RayQuery};
-use marmor::render::{Job, Seconds};
+use marmor::render::{self, Job, Seconds, odd_counts};
 use marmor::report::ErrorPoint;
 use marmor::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -229,7 +229,7 @@ impl<'a> Runner<'a> {
         let passes = self.film.passes() + 1;
         let job = Job { seed: prepared.seed, passes: Some(passes), time: None, cancel };
         let view = View { scene: &prepared.scene, rays: &*self.rays };
-        let outcome = prepared.method.run(view, &job, &mut self.film, &mut [])?;
+        let outcome = render::run(&prepared.method, view, &job, &mut self.film, &mut [])?;
         self.seconds.cache += outcome.seconds.cache;
         self.seconds.gather += outcome.seconds.gather;
         self.tally += outcome.tally;
@@ -264,13 +264,8 @@ impl<'a> Runner<'a> {
     /// What must be known of this render before its figures: samples left out, paths lost, warnings of its scene. Whatever a
     /// run reports beside numbers goes here, and so to the top of the page and of the text.
     pub fn remarks(&self) -> Vec<String> {
-        let (name, counts, gather) = (&self.entrant.name, self.film.counts(), &self.tally.gather);
-        let causes = [
-            (counts.non_finite, "samples are not finite and were left out"),
-            (gather.non_finite, "cached samples are not finite and were left out"),
-            (counts.negative, "samples are below zero"),
-        ];
-        let counted = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{name}: {n} {what}"));
+        let name = &self.entrant.name;
+        let counted = odd_counts(&self.film, &self.tally).into_iter().map(|what| format!("{name}: {what}"));
         let lost = self.lost();
         let warnings = self.entrant.prepared.scene.warnings.iter().map(ToString::to_string);
         counted.chain(lost).chain(warnings).collect()

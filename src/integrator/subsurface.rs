@@ -50,6 +50,24 @@ pub struct SubsurfaceOptions {
     pub seed: u64,
 }
 
+impl Default for SubsurfaceOptions {
+    fn default() -> Self {
+        let estimator = Estimator::Cut;
+        Self {
+            cache_samples: estimator.default_samples(),
+            estimator,
+            cut_error: None,
+            entry: EntrySampling::Light,
+            points: Points::Sobol,
+            spread: Spread::Seen,
+            specular: true,
+            single: true,
+            light_samples: 1,
+            seed: 0,
+        }
+    }
+}
+
 /// L_o = T21 Σ S_d L_t / M + specular reflection, over a cache refilled each pass. Light passes between points of one
 /// object only; what enters is direct light.
 pub struct Subsurface {

@@ -22,7 +22,7 @@ use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::query::{Hit, RayTally};
 use crate::sampling::PixelStream;
-use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface};
+use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
 use body::Body;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
@@ -44,6 +44,13 @@ pub struct VolumePathOptions {
     pub specular: bool,
     /// Seed of the render.
     pub seed: u64,
+}
+
+impl Default for VolumePathOptions {
+    /// Photons for a picture of 512x512 pixels.
+    fn default() -> Self {
+        Self { orders: Orders::All, photons: default_photons([512; 2]), specular: true, seed: 0 }
+    }
 }
 
 /// Unbiased light transport: Lambertian surfaces, lamps, environment, and homogeneous media with Henyey-Greenstein
