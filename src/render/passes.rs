@@ -24,7 +24,7 @@ pub struct Job<'a> {
     pub cancel: &'a AtomicBool,
 }
 
-/// Where the time went [s]; writing and measuring are not in it.
+/// Where the time went \[s\]; writing and measuring are not in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Seconds {
@@ -47,7 +47,7 @@ pub struct Progress<'a> {
     pub film: &'a Film,
     /// Time of all passes so far.
     pub seconds: Seconds,
-    /// What of it earlier runs took [s].
+    /// What of it earlier runs took \[s\].
     pub earlier: f64,
     /// Work of all passes so far.
     pub tally: &'a Tally,
@@ -86,7 +86,7 @@ pub enum Stop {
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Spent {
-    /// Reading scenes and building trees and tables, once for each run [s].
+    /// Reading scenes and building trees and tables, once for each run \[s\].
     pub setup: f64,
     /// Time of all passes.
     pub seconds: Seconds,

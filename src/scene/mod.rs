@@ -20,15 +20,24 @@ mod untraceable;
 mod warnings;
 mod world;
 
-pub use camera::Camera;
-pub use difference::difference;
-pub use doctor::Remark;
-pub use environment::{Environment, EnvironmentEntry};
+pub use environment::EnvironmentEntry;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
-pub use obstacles::{Insides, Obstacle, ObstacleKind};
-pub use options::{
-    EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
-};
+pub use obstacles::{Obstacle, ObstacleKind};
+pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread};
 pub use world::{Material, Object, Scene, Surface, Translucent};
+
+// For what is above this room.
+#[doc(hidden)]
+pub use camera::Camera;
+#[doc(hidden)]
+pub use difference::difference;
+#[doc(hidden)]
+pub use doctor::Remark;
+#[doc(hidden)]
+pub use environment::Environment;
+#[doc(hidden)]
+pub use obstacles::Insides;
+#[doc(hidden)]
+pub use options::default_photons;
