@@ -106,3 +106,8 @@ pub use error::{Error, ErrorKind, Result};
 #[doc(inline)]
 pub use math::{DVec3, Rgb, Vec3};
 pub use render::render;
+
+/// The README's program runs as it stands.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -67,6 +67,16 @@ fn what_is_to_know_of_a_picture_comes_with_it() {
 }
 
 #[test]
+fn the_lecture_has_its_own_model_and_estimator() {
+    let file = SceneFile::parse(&scene(), "made.toml".as_ref()).unwrap();
+    let asked = ["method.model=beam", "method.estimator=all", "method.spread=seen", "method.entry=light"];
+    let notes = Options { as_notes: true, ..Options::default() };
+    let image = |file: &SceneFile, options| marmor::render(file, options).unwrap().image;
+    assert_eq!(image(&file.with(&asked).unwrap(), &notes), image(&file, &notes));
+    assert_ne!(image(&file, &Options::default()), image(&file, &notes));
+}
+
+#[test]
 fn what_makes_no_picture_is_refused() {
     let file = SceneFile::parse(&scene(), "made.toml".as_ref()).unwrap();
     let options = Options::default();
