@@ -31,14 +31,11 @@ pub use window::Window;
 
 // For the passes of `render` and for the program.
 #[doc(hidden)]
-pub use atomic::{check_replaceable, write_atomically};
-#[doc(hidden)]
-pub use checkpoint::{Checkpoint, Identity, checksum};
-#[doc(hidden)]
-pub use judge::{Bias, Brightness, Judged, Judgement, Truth, brightness, judge};
-#[doc(hidden)]
-pub use self_error::{SelfError, SelfErrors, WorstPixel};
-#[doc(hidden)]
-pub use sums::{BadSample, Counts, Film};
-#[doc(hidden)]
-pub use variance::variance;
+pub use self::{
+    atomic::{check_replaceable, write_atomically},
+    checkpoint::{Checkpoint, Identity, checksum},
+    judge::{Bias, Brightness, Judged, Judgement, Truth, brightness, judge},
+    self_error::{SelfError, SelfErrors, WorstPixel},
+    sums::{BadSample, Counts, Film},
+    variance::variance,
+};

@@ -8,27 +8,15 @@ use crate::integrator::{
 use crate::math::Rgb;
 use crate::sampling::Points;
 use crate::scene::{EntrySampling, Estimator, MethodName, MethodOptions, Scene, Spread, default_photons};
+use std::any::Any;
 
-/// A method with its tables.
+/// A method with its tables, under its [`MethodName`].
+#[allow(missing_docs)] // the variants are what they hold
 pub enum Method {
-    /// [`MethodName::AmbientOcclusion`].
     AmbientOcclusion(AmbientOcclusion),
-    /// [`MethodName::Direct`].
     Direct(Box<Direct>),
-    /// [`MethodName::Subsurface`].
     Subsurface(Box<Subsurface>),
-    /// [`MethodName::VolumePath`].
     VolumePath(Box<VolumePath>),
-}
-
-/// What all pixels of a pass of a [`Method`] share.
-pub enum Shared {
-    /// Nothing.
-    Nothing,
-    /// The caches.
-    Subsurface(<Subsurface as Integrator>::Pass),
-    /// The photons.
-    VolumePath(<VolumePath as Integrator>::Pass),
 }
 
 /// How the cache is summed: as the scene says, or as the lecture does.
@@ -123,25 +111,22 @@ macro_rules! each {
     };
 }
 
-impl Integrator for Method {
-    type Pass = Shared;
+/// What [`Method::begin_pass`] put there.
+fn own<T: 'static>(pass: &(dyn Any + Sync)) -> &T {
+    (pass as &dyn Any).downcast_ref().expect("a pass goes back to the method that began it")
+}
 
-    fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Shared {
-        match self {
-            Self::AmbientOcclusion(_) | Self::Direct(_) => Shared::Nothing,
-            Self::Subsurface(method) => Shared::Subsurface(method.begin_pass(view, pass, tally)),
-            Self::VolumePath(method) => Shared::VolumePath(method.begin_pass(view, pass, tally)),
-        }
+impl Integrator for Method {
+    /// That of the method itself.
+    type Pass = Box<dyn Any + Sync>;
+
+    #[allow(clippy::unit_arg)] // what pixels share may be nothing
+    fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
+        each!(self, method => Box::new(method.begin_pass(view, pass, tally)))
     }
 
-    fn radiance(&self, view: View<'_>, pass: &Shared, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
-        match (self, pass) {
-            (Self::AmbientOcclusion(method), Shared::Nothing) => method.radiance(view, &(), rays, out, tally),
-            (Self::Direct(method), Shared::Nothing) => method.radiance(view, &(), rays, out, tally),
-            (Self::Subsurface(method), Shared::Subsurface(pass)) => method.radiance(view, pass, rays, out, tally),
-            (Self::VolumePath(method), Shared::VolumePath(pass)) => method.radiance(view, pass, rays, out, tally),
-            _ => unreachable!("the pass was begun by another method"),
-        }
+    fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
+        each!(self, method => method.radiance(view, own(&**pass), rays, out, tally));
     }
 
     fn shares_tiles(&self) -> bool {

@@ -9,20 +9,20 @@ mod method;
 mod passes;
 
 #[doc(inline)]
-pub use crate::cache::{Clock, GatherTally};
-#[doc(inline)]
-pub use crate::integrator::{Tally, WalkTally};
-#[doc(inline)]
-pub use crate::query::{Backend, RayTally};
-#[doc(hidden)]
-pub use first_hit::{Seen, first_hit};
-#[doc(hidden)]
-pub use framing::{Aim, nothing_in_view, shares};
+pub use crate::{
+    cache::{Clock, GatherTally},
+    integrator::{Tally, WalkTally},
+    query::{Backend, RayTally},
+};
 pub use front::{DEFAULT_SPP, Options, Rendered, render};
-#[doc(hidden)]
-pub use front::{Prepared, no_light, odd_counts};
-#[doc(hidden)]
-pub use method::{Method, Shared};
 pub use passes::Seconds;
+
+// For the program and the tests.
 #[doc(hidden)]
-pub use passes::{Job, Observer, Outcome, Progress, Spent, Stop, replay, resume, run};
+pub use self::{
+    first_hit::{Seen, first_hit},
+    framing::{Aim, nothing_in_view, shares},
+    front::{Prepared, no_light, odd_counts},
+    method::Method,
+    passes::{Job, Observer, Outcome, Progress, Spent, Stop, replay, resume, run},
+};

@@ -30,14 +30,7 @@ pub use world::{Material, Object, Scene, Surface, Translucent};
 
 // For what is above this room.
 #[doc(hidden)]
-pub use camera::Camera;
-#[doc(hidden)]
-pub use difference::difference;
-#[doc(hidden)]
-pub use doctor::Remark;
-#[doc(hidden)]
-pub use environment::Environment;
-#[doc(hidden)]
-pub use obstacles::Insides;
-#[doc(hidden)]
-pub use options::default_photons;
+pub use self::{
+    camera::Camera, difference::difference, doctor::Remark, environment::Environment, obstacles::Insides,
+    options::default_photons,
+};
