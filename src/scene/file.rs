@@ -94,7 +94,8 @@ impl SceneFile {
     }
 
     /// The file with options of the form `path.to.key=value` put over it, in order; lists count from 0
-    /// (`object.0.material=marble`). A value that is no TOML is taken as text.
+    /// (`object.0.material=marble`). A value that is no TOML is taken as text. It is made of what was typed: fields changed
+    /// since then are not in it.
     ///
     /// # Errors
     /// A usage error if the form or a list's number is wrong; a scene error, naming the option, if the value is.
