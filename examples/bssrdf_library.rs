@@ -6,10 +6,9 @@
 //! ```
 #![allow(clippy::print_stdout)] // an example shows its results
 
-use marmor::Result;
 use marmor::bssrdf::{Bssrdf as _, Entry, Exit, ModelName, ModelOptions, StandardDipole};
-use marmor::math::{Rgb, Vec3};
 use marmor::optics::{self, AlbedoCurve, AlbedoLaw, ChannelOptics, FresnelMoments, Medium, Trust};
+use marmor::{Result, Rgb, Vec3};
 use std::f64::consts::PI;
 
 fn main() -> Result<()> {

@@ -8,6 +8,7 @@ pub type Result<T> = std::result::Result<T, Error>;
 
 /// What went wrong, by who can mend it. The command line maps each kind to one exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ErrorKind {
     /// The call itself: options, names, a part that is not in this build (exit code 2).
     Usage,

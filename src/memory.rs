@@ -4,7 +4,7 @@ use crate::{Error, ErrorKind, Result};
 use std::fs::read_to_string;
 use std::path::Path;
 
-/// Memory that this process can still get [bytes], where the system tells (Linux): what is free or can be freed, and no
+/// Memory that this process can still get \[bytes\], where the system tells (Linux): what is free or can be freed, and no
 /// more than its control groups (versions 2 and 1: containers, batch systems) and its own limit (`ulimit -v`) leave it.
 pub fn available() -> Option<u64> {
     let free = read_to_string("/proc/meminfo").ok().as_deref().and_then(parse_available);
@@ -15,7 +15,7 @@ pub fn available() -> Option<u64> {
     free.into_iter().chain(left_by_groups(&groups, Path::new("/sys/fs/cgroup"))).chain(own).min()
 }
 
-/// The most memory that this process had at any time [bytes], where the system tells (Linux).
+/// The most memory that this process had at any time \[bytes\], where the system tells (Linux).
 pub fn peak() -> Option<u64> {
     let status = read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

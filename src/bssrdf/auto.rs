@@ -34,7 +34,7 @@ impl std::fmt::Display for Choice {
     }
 }
 
-/// The best model there is for `medium`, in a slab of `thickness` [unit] if the object is one.
+/// The best model there is for `medium`, in a slab of `thickness` \[unit\] if the object is one.
 pub fn choose(medium: &Medium, thickness: Option<f32>) -> Choice {
     let scattering = || medium.channels().into_iter().filter(|k| k.alpha_prime > 0.0);
     if scattering().next().is_none() {

@@ -38,8 +38,8 @@ pub enum KappaExtinction {
     Full,
 }
 
-/// Photon beam diffusion [HCJ13]: first scattering is spread along the refracted ray, and each point of it diffuses
-/// as a dipole with Grosjean's diffusion coefficient [dEo12].
+/// Photon beam diffusion \[HCJ13\]: first scattering is spread along the refracted ray, and each point of it diffuses
+/// as a dipole with Grosjean's diffusion coefficient \[dEo12\].
 ///
 ///   M = ∫ α′² σ_t′ exp(-σ_t′ t) κ(t) dip(t) dt,   S_d = M / (π · 4 C_phi(1/η))
 ///   dip(t) = 1/4π · { C_phi/D [g0(d_r) - g0(d_v)] + C_E [g1(z_r, d_r) + g1(z_v, d_v)] }
@@ -163,7 +163,7 @@ impl BeamChannel {
         self.radiance * self.exitance(x, n_i, w)
     }
 
-    /// M [1/unit²] per entered flux, from x = x_o - x_i [unit], the outward normal of the entry and the refracted
+    /// M [1/unit²] per entered flux, from x = x_o - x_i \[unit\], the outward normal of the entry and the refracted
     /// direction inside.
     pub fn exitance(&self, x: DVec3, n_i: DVec3, w: DVec3) -> f64 {
         self.integral(&Pair::new(x, n_i, w), 0.0)
@@ -293,7 +293,7 @@ impl BeamChannel {
             .sum()
     }
 
-    /// What depth `t` [unit] alone gives, over its own density σ_t′ exp(-σ_t′ t), times e^{gain}.
+    /// What depth `t` \[unit\] alone gives, over its own density σ_t′ exp(-σ_t′ t), times e^{gain}.
     #[inline]
     fn at_depth(&self, pair: &Pair, t: f64, gain: f64) -> f64 {
         let length = self.sigma_t_prime;
@@ -339,12 +339,12 @@ impl PhotonBeamDiffusion {
         &self.depths
     }
 
-    /// A depth t [unit] along the refracted ray from `u` in [0, 1), increasing in `u`; see [`DepthLaw`].
+    /// A depth t \[unit\] along the refracted ray from `u` in [0, 1), increasing in `u`; see [`DepthLaw`].
     pub fn sample_depth(&self, u: f32) -> f32 {
         self.depths.sample(f64::from(u)) as f32
     }
 
-    /// One sample of the depth integral: S_d of the source at depth `t` [unit], over the density of `t` under
+    /// One sample of the depth integral: S_d of the source at depth `t` \[unit\], over the density of `t` under
     /// [`Self::sample_depth`], so that its mean over depths is [`Bssrdf::eval`]. Times exp(`rate` · |x_o - x_i|), see
     /// [`Bssrdf::eval_compensated`]. Costs one dipole a channel.
     ///

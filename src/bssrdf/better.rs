@@ -12,7 +12,7 @@ pub(super) static MODEL: ModelKind = ModelKind {
     ..ModelKind::new("better", |medium, options| Ok(Box::new(BetterDipole::new(medium, options.exit_normalisation))))
 };
 
-/// The better dipole [dEo12]: Grosjean's diffusion coefficient, the boundary with both Fresnel moments, and an exitance
+/// The better dipole \[dEo12\]: Grosjean's diffusion coefficient, the boundary with both Fresnel moments, and an exitance
 /// of fluence and flux. With lengths in l′ = 1/σ_t′, D = (2 - α′)/3, s = sqrt((1 - α′)/D), z_v = 1 + 4 A D and
 /// A = (1 + 3 C_2) / (1 - 2 C_1):
 ///

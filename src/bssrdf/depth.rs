@@ -28,7 +28,7 @@ impl DepthLaw {
         self.sigma.map(|s| if s > 0.0 { exp(-(s - self.least) * t) } else { 0.0 })
     }
 
-    /// The depth [unit] with cumulative probability `u` in [0, 1); 0 if no channel takes part. Monotone, so that
+    /// The depth \[unit\] with cumulative probability `u` in [0, 1); 0 if no channel takes part. Monotone, so that
     /// stratified numbers give stratified depths.
     pub fn sample(&self, u: f64) -> f64 {
         if self.count == 0.0 {
@@ -54,13 +54,13 @@ impl DepthLaw {
         t.max(0.0)
     }
 
-    /// Probability of a depth below `t` [unit], which may be infinite.
+    /// Probability of a depth below `t` \[unit\], which may be infinite.
     pub fn cumulative(&self, t: f64) -> f64 {
         let live = self.sigma.iter().filter(|&&s| s > 0.0);
         live.map(|s| -(-s * t).exp_m1()).sum::<f64>() / self.count.max(1.0)
     }
 
-    /// Density of a depth `t` [unit] under [`Self::sample`] [1/unit].
+    /// Density of a depth `t` \[unit\] under [`Self::sample`] [1/unit].
     pub fn pdf(&self, t: f64) -> f64 {
         if self.count == 0.0 {
             return 0.0;

@@ -15,7 +15,7 @@ pub(super) static MODEL: ModelKind = ModelKind {
     ..ModelKind::new("directional", |medium, options| Ok(Box::new(DirectionalDipole::new(medium, options.calibrated))))
 };
 
-/// The directional dipole [FHK14]: a ray source along the refracted direction and its mirror image in a plane
+/// The directional dipole \[FHK14\]: a ray source along the refracted direction and its mirror image in a plane
 /// through the two points, modified so that it contains the line between them.
 ///
 /// With D = 1/(3 σ_t′), s = √(σ_a/D), d_e = 2.131 D/√α′, A with both Fresnel moments, x = x_o - x_i:
@@ -165,7 +165,7 @@ impl DirectionalChannel {
         }
     }
 
-    /// S_d [1/(unit² sr)] before the clamp at 0, from x = x_o - x_i [unit], the outward normal of the entry, the
+    /// S_d [1/(unit² sr)] before the clamp at 0, from x = x_o - x_i \[unit\], the outward normal of the entry, the
     /// refracted direction inside and the outward normal of the exit.
     pub fn unclamped(&self, x: DVec3, n_i: DVec3, w: DVec3, n_o: DVec3) -> f64 {
         self.kernel(&Pair::new(x, n_i, w, n_o), 0.0)
@@ -285,7 +285,7 @@ impl DirectionalDipole {
         Rgb::from_fn(|c| value(&self.channels[c]))
     }
 
-    /// Delta-Eddington extinction σ_s (1 - g²) + σ_a [1/unit] of the reduced-intensity part S_dE of [FHK14]: the
+    /// Delta-Eddington extinction σ_s (1 - g²) + σ_a [1/unit] of the reduced-intensity part S_dE of \[FHK14\]: the
     /// light that is refracted in, attenuated by exp(-extinction · length) along a straight path, and refracted
     /// out. It is a specular path of the renderer, multiplied by that factor, and no part of [`Bssrdf::eval`].
     pub fn reduced_intensity_extinction(&self) -> Rgb {

@@ -36,7 +36,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// A place of thickness [unit] and mean curvature [1/unit] in one channel of a medium.
+    /// A place of thickness \[unit\] and mean curvature [1/unit] in one channel of a medium.
     pub fn new(optics: &ChannelOptics, eta: f64, thickness: f64, curvature: f64) -> Self {
         let path = optics.transport_mean_free_path;
         Self {

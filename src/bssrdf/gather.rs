@@ -35,7 +35,7 @@ impl Layout {
 /// Entries in columns of one length.
 #[derive(Clone, Copy, Debug)]
 pub struct EntryColumns<'a> {
-    /// x, y, z of the points [unit].
+    /// x, y, z of the points \[unit\].
     pub x: [&'a [f32]; 3],
     /// Flux or any other weight, per channel.
     pub weight: [&'a [f32]; 3],

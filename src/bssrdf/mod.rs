@@ -34,9 +34,13 @@ pub use channel::ChannelMedium;
 pub use depth::DepthLaw;
 pub use directional::{DirectionalChannel, DirectionalDipole};
 pub use expected::{ExpectedError, Place, Unmeasured, expected_error, measured_albedos};
+#[doc(hidden)]
 pub use gather::{EntryColumns, LEAST_COLUMNS, Layout, MOST_COLUMNS, Row};
-pub use model::{ModelKind, ModelName, ModelOptions, all_models};
+#[doc(hidden)]
+pub use model::all_models;
+pub use model::{ModelKind, ModelName, ModelOptions};
 pub use normalised::{NormalisedDiffusion, WidthFit};
+#[doc(hidden)]
 pub use partition::Partition;
 pub use radial::Radial;
 pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
@@ -46,7 +50,7 @@ pub use standard::StandardDipole;
 /// Where and how light goes in.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    /// Point of entry [unit].
+    /// Point of entry \[unit\].
     pub x: Vec3,
     /// Outward unit normal there.
     pub n: Vec3,
@@ -57,7 +61,7 @@ pub struct Entry {
 /// Where and how light comes out.
 #[derive(Clone, Copy, Debug)]
 pub struct Exit {
-    /// Point of exit [unit].
+    /// Point of exit \[unit\].
     pub x: Vec3,
     /// Outward unit normal there.
     pub n: Vec3,
@@ -86,14 +90,16 @@ pub trait Bssrdf: Send + Sync {
         self.eval(entry, exit)
     }
 
-    /// Depth along the refracted ray [unit] that a cached sample stands for, from `u` in [0, 1); 0 for models without
+    /// Depth along the refracted ray \[unit\] that a cached sample stands for, from `u` in [0, 1); 0 for models without
     /// sources inside.
+    #[doc(hidden)]
     fn sample_depth(&self, _u: f32) -> f32 {
         0.0
     }
 
     /// What a cached sample of `depth` gives: its mean over depths from [`Self::sample_depth`] is
     /// [`Self::eval_compensated`]. Models whose S_d is an integral over depth evaluate one depth only.
+    #[doc(hidden)]
     fn eval_cached(&self, entry: &Entry, _depth: f32, exit: &Exit, rate: f32) -> Rgb {
         self.eval_compensated(entry, exit, rate)
     }
@@ -123,23 +129,27 @@ pub trait Bssrdf: Send + Sync {
 
     /// What decides how far an entry is from an exit [unit²], see [`Partition`]: the distance between them, or for models
     /// with interior sources the way along the refracted ray and from its end to the exit.
+    #[doc(hidden)]
     fn apart2(&self, entry: &Entry, _depth: f32, exit: &Exit) -> f32 {
         entry.x.distance_squared(exit.x)
     }
 
     /// Relative variation of S_d over cached samples at about one distance, which comes from directions or depths. Only the noise
     /// of an estimate depends on it.
+    #[doc(hidden)]
     fn variation(&self) -> f32 {
         0.0
     }
 
     /// What the columns of its cached samples hold.
+    #[doc(hidden)]
     fn layout(&self) -> Layout {
         Layout::DIRECTIONS
     }
 
     /// A cached sample as a row of columns: point, weights, normal, refracted direction, of which as many count as the
     /// layout has.
+    #[doc(hidden)]
     fn row(&self, entry: &Entry, _depth: f32, flux: Rgb) -> Row {
         let (Entry { x, n, w }, [r, g, b]) = (entry, flux.0);
         [x.x, x.y, x.z, r, g, b, n.x, n.y, n.z, w.x, w.y, w.z]
@@ -147,11 +157,13 @@ pub trait Bssrdf: Send + Sync {
 
     /// Σ S_d weight per channel over all `entries`, columns of this model's [`Self::row`], to each of `exits`, into `sums`. The bits
     /// do not depend on `level`. Values of S_d below zero count as 0; returns how many there were.
+    #[doc(hidden)]
     fn gather_at(&self, _level: Level, exits: &[Exit], entries: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
         gather::one_by_one(|entry, exit| self.eval_signed(entry, exit), exits, entries, sums)
     }
 
     /// [`Self::gather_at`] with the widest instruction set of this machine.
+    #[doc(hidden)]
     fn gather(&self, exits: &[Exit], entries: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
         self.gather_at(Level::best(), exits, entries, sums)
     }

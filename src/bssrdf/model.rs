@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::optics::Medium;
 
 /// A row of the registry: what is known of a model before it is made of a medium.
+#[non_exhaustive]
 pub struct ModelKind {
     /// The name in scene files and on the command line.
     pub name: &'static str,
@@ -28,10 +29,10 @@ impl ModelKind {
 /// What a model is made with beside its medium. Each heeds what [`ModelKind::takes`] says.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelOptions {
-    /// Divide S_d by 4 C_phi(1/η), so that the exit Fresnel factor loses no energy; off, dipoles give R_d / π as [JMLH01]
+    /// Divide S_d by 4 C_phi(1/η), so that the exit Fresnel factor loses no energy; off, dipoles give R_d / π as \[JMLH01\]
     /// prints it.
     pub exit_normalisation: bool,
-    /// Thickness of the object [unit]; the models of half spaces do not heed it.
+    /// Thickness of the object \[unit\]; the models of half spaces do not heed it.
     pub thickness: Option<f32>,
     /// n_inside / n_outside of the far face of a slab; that of the lit face if absent.
     pub eta_far: Option<f32>,
@@ -51,7 +52,7 @@ impl ModelOptions {
         kappa: KappaExtinction::Reduced,
     };
 
-    /// A sheet of `thickness` [unit].
+    /// A sheet of `thickness` \[unit\].
     pub fn thick(thickness: f32) -> Self {
         Self { thickness: Some(thickness), ..Self::DEFAULT }
     }

@@ -60,7 +60,7 @@ pub(super) static MODEL: ModelKind = ModelKind {
     })
 };
 
-/// Normalised diffusion [CB15]: two exponentials fitted to Monte Carlo profiles, with the integral A built in.
+/// Normalised diffusion \[CB15\]: two exponentials fitted to Monte Carlo profiles, with the integral A built in.
 ///
 ///   R_d(r) = A (exp(-r/d) + exp(-r/3d)) / (8π d r),   CDF(r) = 1 - exp(-r/d)/4 - 3 exp(-r/3d)/4
 ///
@@ -105,7 +105,7 @@ impl NormalisedDiffusion {
         Self::from_widths(channels, medium.eta, exit_normalisation)
     }
 
-    /// From the albedo A in [0, 1] and the length l [unit] that `fit` expects, behind a boundary `eta`.
+    /// From the albedo A in [0, 1] and the length l \[unit\] that `fit` expects, behind a boundary `eta`.
     ///
     /// # Errors
     /// An albedo outside [0, 1], a length or an `eta` that is not positive and finite.
@@ -128,7 +128,7 @@ impl NormalisedDiffusion {
         Ok(Self::from_widths(channels, eta, exit_normalisation))
     }
 
-    /// From (A, d [unit]) per channel; an infinite d stands for no medium.
+    /// From (A, d \[unit\]) per channel; an infinite d stands for no medium.
     fn from_widths(channels: [(f64, f64); 3], eta: f32, exit_normalisation: bool) -> Self {
         let moments = FresnelMoments::new(f64::from(eta));
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
@@ -155,18 +155,18 @@ impl NormalisedDiffusion {
         }
     }
 
-    /// The width d [unit] of `channel`; infinite where there is no medium.
+    /// The width d \[unit\] of `channel`; infinite where there is no medium.
     pub fn width(&self, channel: usize) -> f64 {
         self.widths[channel]
     }
 
-    /// The part of the exitance of `channel` within `r` [unit].
+    /// The part of the exitance of `channel` within `r` \[unit\].
     pub fn cdf(&self, channel: usize, r: f64) -> f64 {
         let x = r / self.widths[channel];
         -0.25 * (-x).exp_m1() - 0.75 * (-x / 3.0).exp_m1()
     }
 
-    /// The radius [unit] within which the part `u` in [0, 1) of the exitance of `channel` lies: a sample of the radius
+    /// The radius \[unit\] within which the part `u` in [0, 1) of the exitance of `channel` lies: a sample of the radius
     /// if `u` is uniform. In closed form: with y the real root of y³ + 3y = 4(1 - u), r = -3 d ln y.
     pub fn sample_radius(&self, channel: usize, u: f64) -> f64 {
         let d = self.widths[channel];

@@ -14,17 +14,17 @@ impl Partition {
     /// Everything is far: the whole.
     pub const NONE: Self = Self { inverse: f32::INFINITY, middle: 0.0 };
 
-    /// The far part, where nothing beyond `radius` > 0 [unit] is near.
+    /// The far part, where nothing beyond `radius` > 0 \[unit\] is near.
     pub fn beyond(radius: f32) -> Self {
         Self { inverse: 1.0 / (radius * radius), middle: 0.0 }
     }
 
-    /// The near part, nothing of it beyond `radius` > 0 [unit].
+    /// The near part, nothing of it beyond `radius` > 0 \[unit\].
     pub fn within(radius: f32) -> Self {
         Self { middle: 1.0, ..Self::beyond(radius) }
     }
 
-    /// The part's share of S_d at √`r2` [unit]. Of the far part 0 up to half the radius R, then t²(3 - 2t) with t the part
+    /// The part's share of S_d at √`r2` \[unit\]. Of the far part 0 up to half the radius R, then t²(3 - 2t) with t the part
     /// of the way from R²/4 to R², then 1; of the near part what that leaves, beyond R exactly 0.
     #[inline(always)]
     pub fn share(self, r2: f32) -> f32 {
@@ -38,7 +38,7 @@ impl Partition {
         (self.middle - t * t * (3.0 - 2.0 * t)).abs()
     }
 
-    /// [`Self::share`] for a source that light reached along `travelled` [unit] inside: far where a surface point beyond the
+    /// [`Self::share`] for a source that light reached along `travelled` \[unit\] inside: far where a surface point beyond the
     /// radius may be its entry.
     #[inline(always)]
     pub fn share_source(self, r2: f32, travelled: f32) -> f32 {

@@ -7,14 +7,14 @@ use crate::math::{Kernel, Level, Rgb, Vec3, dispatch_at};
 
 /// A model that can say M(r): exitance at distance r per flux that entered.
 pub trait Radial: Bssrdf {
-    /// M(r) [1/unit²] at distance `r` ≥ 0 [unit] on a plane, by the code that renders: S_d times π, and times
+    /// M(r) [1/unit²] at distance `r` ≥ 0 \[unit\] on a plane, by the code that renders: S_d times π, and times
     /// 4 C_phi(1/eta) where S_d was divided by it.
     fn exitance(&self, r: f32) -> Rgb;
 
     /// [`Self::exitance`] of one `channel`.
     fn exitance_one(&self, channel: usize, r: f32) -> f32;
 
-    /// M(r) of one `channel` for each `r` [unit], vectorised with `level` or the widest instruction set below it; the
+    /// M(r) of one `channel` for each `r` \[unit\], vectorised with `level` or the widest instruction set below it; the
     /// bits do not depend on it, and are those of [`Self::exitance`]. Extra items of the longer slice are left alone.
     fn exitance_batch_at(&self, level: Level, channel: usize, r: &[f32], out: &mut [f32]);
 

@@ -39,7 +39,7 @@ impl SingleChannel {
         Self { medium: *medium }
     }
 
-    /// Exitance M_1 [1/unit²] of a pencil beam per entered flux, from x = x_o - x_i [unit] in the plane with outward
+    /// Exitance M_1 [1/unit²] of a pencil beam per entered flux, from x = x_o - x_i \[unit\] in the plane with outward
     /// normal `n`, and the refracted direction `w` inside:
     ///
     ///   M_1 = ∫ σ_s exp(-σ_t (t + d)) p(cos) T(η, z/d) (z/d)/d² dt,   d = |x - t w|,  z = -t w·n
@@ -129,14 +129,14 @@ impl SingleChannel {
     }
 }
 
-/// Exact single scattering of a medium, for an integrator that follows the refracted ray of the camera [JMLH01]:
+/// Exact single scattering of a medium, for an integrator that follows the refracted ray of the camera \[JMLH01\]:
 ///
 ///   L_1 = T21/η² ∫∫ σ_s exp(-σ_t (s + s_i′)) p(w_i′, w_o′) T12 L_i |w_i·n_i| / |w_i′·n_i| dw_i ds
 ///
 /// s is the distance along that ray, s_i′ the refracted path to the surface, estimated from the straight distance s_i
 /// along the shadow ray: s_i′ = s_i |w_i·n_i| / |w_i′·n_i|. Exact on a plane. The published form for one sample has
 /// neither 1/η² (radiance leaving the medium) nor the ratio of cosines (the refracted beam is squeezed); without
-/// them a plane does not give the result of [HK93].
+/// them a plane does not give the result of \[HK93\].
 ///
 /// Belongs to models of orders 2 and higher. Dipoles of all orders contain it already.
 #[derive(Clone, Debug)]
@@ -148,7 +148,7 @@ pub struct SingleScattering {
 /// A distance along the camera's ray and its density.
 #[derive(Clone, Copy, Debug)]
 pub struct DistanceSample {
-    /// Distance from the point where the ray entered [unit].
+    /// Distance from the point where the ray entered \[unit\].
     pub distance: f32,
     /// Density of `distance` [1/unit].
     pub pdf: f32,
@@ -161,7 +161,7 @@ pub struct LightPath {
     pub w_i: Vec3,
     /// Outward unit normal where the straight line leaves the medium.
     pub n_i: Vec3,
-    /// Distance to there along the straight line [unit].
+    /// Distance to there along the straight line \[unit\].
     pub distance: f32,
 }
 
@@ -173,7 +173,7 @@ impl SingleScattering {
         Self { media, distances }
     }
 
-    /// A distance in proportion to exp(-σ_t s), up to `longest` [unit], where the camera's ray leaves the medium
+    /// A distance in proportion to exp(-σ_t s), up to `longest` \[unit\], where the camera's ray leaves the medium
     /// (infinite if it does not); one for the three channels, see [`DepthLaw`]. `None` without scattering. `u` in
     /// [0, 1). Do not sample the surface instead: the integrand has a pole 1/d² at each of its points.
     pub fn sample_distance(&self, u: f32, longest: f32) -> Option<DistanceSample> {
@@ -230,7 +230,7 @@ impl SingleScattering {
         Rgb::from_fn(|c| to_finite(common * attenuated(&self.media[c], refracted)))
     }
 
-    /// BRDF [1/sr] of a half space with a distant light, single scattering alone [HK93], T12 and T21 included; `w_i`
+    /// BRDF [1/sr] of a half space with a distant light, single scattering alone \[HK93\], T12 and T21 included; `w_i`
     /// and `w_o` point away from the surface with normal `n`:
     ///
     ///   f_1 = α/η² T12 T21 p(w_i′, w_o′) / (μ_i′ + μ_o′)

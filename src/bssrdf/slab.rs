@@ -21,7 +21,7 @@ pub(super) static MODEL: ModelKind = ModelKind {
     })
 };
 
-/// The multipole of a flat slab [DJ05]: the point source at depth l′ and its images in both extrapolated boundaries,
+/// The multipole of a flat slab \[DJ05\]: the point source at depth l′ and its images in both extrapolated boundaries,
 /// without end. With lengths in l′ = 1/σ_t′, s = sqrt(3 (1 - α′)), z_b = 2/3 A at each face, period
 /// P = 2 (H + z_bt + z_bb), z_ri = i P + 1, z_vi = i P - 1 - 2 z_bt:
 ///
@@ -78,7 +78,7 @@ pub struct Face {
 }
 
 impl Slab {
-    /// A slab of `thickness` [unit] with the same medium outside both faces. See [`super::ModelOptions`].
+    /// A slab of `thickness` \[unit\] with the same medium outside both faces. See [`super::ModelOptions`].
     ///
     /// # Errors
     /// As [`Self::between`].
@@ -134,7 +134,7 @@ impl Slab {
         })
     }
 
-    /// T(r) [1/unit²]: exitance through the far face at distance `r` [unit] along it.
+    /// T(r) [1/unit²]: exitance through the far face at distance `r` \[unit\] along it.
     pub fn transmitted(&self, r: f32) -> Rgb {
         Rgb::from_fn(|c| (&self.transmitted[c]).value(r * r) * self.exitance[1])
     }

@@ -13,7 +13,7 @@ pub(super) static MODEL: ModelKind = ModelKind {
     })
 };
 
-/// The standard dipole [JMLH01]: a point source one transport mean free path l′ below the entry and its image above
+/// The standard dipole \[JMLH01\]: a point source one transport mean free path l′ below the entry and its image above
 /// the surface, so that fluence vanishes on the extrapolated boundary. With lengths in l′ = 1/σ_t′ and
 /// s = sqrt(3 (1 - α′)):
 ///

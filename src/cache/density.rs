@@ -33,7 +33,7 @@ pub struct Density {
 pub struct Seen {
     /// Where [unit].
     pub x: DVec3,
-    /// Mean squared distance between it and the surface points that it stands for [unit²].
+    /// Mean squared distance between it and the surface points that it stands for \[unit²\].
     pub spread2: f32,
 }
 

@@ -41,6 +41,24 @@ pub struct SubsurfaceOptions {
     pub seed: u64,
 }
 
+impl Default for SubsurfaceOptions {
+    fn default() -> Self {
+        let estimator = Estimator::Cut;
+        Self {
+            cache_samples: estimator.default_samples(),
+            estimator,
+            cut_error: None,
+            entry: EntrySampling::Light,
+            points: Points::Sobol,
+            spread: Spread::Seen,
+            specular: true,
+            single: true,
+            light_samples: 1,
+            seed: 0,
+        }
+    }
+}
+
 impl SubsurfaceOptions {
     /// Whether sums may be cut in a near part and the rest, and exits share work; the lecture's law takes the cache alone, exit
     /// by exit.

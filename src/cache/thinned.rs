@@ -25,7 +25,7 @@ impl Thinning {
 }
 
 /// (1/M) Σ S_d L_t, each sample kept with probability exp(-σ_tr d) independently of the others and weighted by its inverse:
-/// exactly the law of [`super::notes`]. All members of a node are kept with at most the probability of its nearest point;
+/// exactly the law of `notes.rs`. All members of a node are kept with at most the probability of its nearest point;
 /// the next one that passes this bound is found by one geometric jump, and then kept with what is left of its own.
 pub fn thinned(thinning: &Thinning, model: &dyn Bssrdf, exit: &Exit, key: u64, tally: &mut GatherTally) -> Rgb {
     let decay = model.decay();

@@ -7,7 +7,7 @@ use super::setup::{MethodArgs, prepare};
 use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
 use marmor::geometry::{Mended, load_obj, mended, write_obj};
-use marmor::integrator::{TOLERANCE, View};
+use marmor::integrator::{Integrator as _, TOLERANCE, View};
 use marmor::optics::{ChannelOptics, Medium};
 use marmor::query;
 use marmor::scene::{Emission, Geometry, Object, Scene, Surface};

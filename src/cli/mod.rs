@@ -95,6 +95,7 @@ pub fn main() -> ExitCode {
             ErrorKind::File => 4,
             ErrorKind::Numeric => 5,
             ErrorKind::Memory => 6,
+            _ => 1,
         })
     })
 }

@@ -3,7 +3,7 @@
 
 use super::setup::{Method, Prepared};
 use marmor::film::{Film, Window};
-use marmor::integrator::View;
+use marmor::integrator::{Integrator as _, View};
 use marmor::math::Rgb;
 use marmor::query::Backend;
 use marmor::scene::{Geometry, Surface};

@@ -8,9 +8,9 @@ use super::{stdout, threads};
 use marmor::film::{
     Checkpoint, Film, Format, Image, SelfError, Truth, Window, check_replaceable, judge, write_atomically,
 };
-use marmor::integrator::{View, lost};
+use marmor::integrator::{Integrator as _, View, lost};
 use marmor::query::{self, RayQuery};
-use marmor::render::{Job, Seconds};
+use marmor::render::{self, Job, Seconds, odd_counts};
 use marmor::report::ErrorPoint;
 use marmor::tally::Tally;
 use marmor::words::counted;
@@ -231,7 +231,7 @@ impl<'a> Runner<'a> {
         let passes = self.film.passes() + 1;
         let job = Job { seed: prepared.seed, passes: Some(passes), time: None, cancel };
         let view = View { scene: &prepared.scene, rays: &*self.rays };
-        let outcome = prepared.method.run(view, &job, &mut self.film, &mut [])?;
+        let outcome = render::run(&prepared.method, view, &job, &mut self.film, &mut [])?;
         self.seconds.cache += outcome.seconds.cache;
         self.seconds.gather += outcome.seconds.gather;
         self.tally += outcome.tally;
@@ -277,13 +277,8 @@ impl<'a> Runner<'a> {
     /// What must be known of this render before its figures: samples left out, lights not met, paths lost, warnings of its scene. Whatever a
     /// run reports beside numbers goes here, and so to the top of the page and of the text.
     pub fn remarks(&self) -> Vec<String> {
-        let (name, counts, gather) = (&self.entrant.name, self.film.counts(), &self.tally.gather);
-        let causes = [
-            (counts.non_finite, "samples are not finite and were left out"),
-            (gather.non_finite, "cached samples are not finite and were left out"),
-            (counts.negative, "samples are below zero"),
-        ];
-        let counted = causes.iter().filter(|(n, _)| *n > 0).map(|(n, what)| format!("{name}: {n} {what}"));
+        let name = &self.entrant.name;
+        let counted = odd_counts(&self.film, &self.tally).into_iter().map(|what| format!("{name}: {what}"));
         let not_met = self.not_met();
         let not_met = (!not_met.is_empty()).then(|| {
             let names: Vec<String> = not_met.iter().map(|light| format!("\"{light}\"")).collect();

@@ -11,19 +11,16 @@ use super::setup::{Method, MethodArgs, prepare};
 use super::stats::{self, Stats};
 use super::{read_picture, replay, threads};
 use marmor::film::{Film, Format, Image, Window, check_replaceable, check_writable};
-use marmor::integrator::{Integrator, Part, View, lost};
+use marmor::integrator::{Integrator as _, View, lost};
 use marmor::query;
-use marmor::render::{self, Job, Observer, Outcome, Spent, Stop};
+use marmor::render::{self, Job, Observer, Options, Outcome, Spent, Stop, no_light};
 use marmor::report::RecordFile;
-use marmor::scene::{Object, Scene, SceneFile};
+use marmor::scene::{Scene, SceneFile};
 use marmor::words::counted;
 use marmor::{Error, ErrorKind, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
-
-/// Samples per pixel where neither scene nor options say.
-const DEFAULT_SPP: u32 = 64;
 
 #[derive(clap::Args)]
 pub struct Args {
@@ -115,12 +112,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let reference = reference.map(|(_, image)| image);
         let passes = match &args.keep.samples_range {
             Some(range) => Some(range.end),
-            None => Some(args.spp.or(file.render.spp).unwrap_or(DEFAULT_SPP))
-                .filter(|_| args.spp.is_some() || args.time.is_none() && args.target_error.is_none()),
+            None if args.target_error.is_some() && args.spp.is_none() => None,
+            None => Options { spp: args.spp, time: args.time, ..args.method.options() }.passes(&file)?,
         };
-        if passes == Some(0) {
-            return Err(Error::usage("0 samples per pixel make no picture; ask for at least 1 with --spp"));
-        }
         let prepared = prepare(file, &args.method)?;
         let scene = &prepared.scene;
         for warning in &scene.warnings {
@@ -176,12 +170,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         let silent = verbosity == Verbosity::Quiet;
         let advice = (!silent || args.stats.is_some()).then(|| Advice::before_render(&prepared, view, window, silent));
         task.advice = advice.as_ref();
-        let finished = match &prepared.method {
-            Method::AmbientOcclusion(method) => task.run(method, view, &job, &mut film, spent, &mut keeper)?,
-            Method::Direct(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
-            Method::Subsurface(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
-            Method::VolumePath(method) => task.run(&**method, view, &job, &mut film, spent, &mut keeper)?,
-        };
+        let finished = task.run(&prepared.method, view, &job, &mut film, spent, &mut keeper)?;
         let spent = Spent { setup: keeper.setup, seconds: finished.seconds, tally: finished.tally };
         match outputs.save(&film, &spent) {
             Ok(said) if verbosity > Verbosity::Quiet => said.iter().for_each(|line| eprintln!("{line}")),
@@ -261,17 +250,16 @@ struct Task<'a> {
 }
 
 impl Task<'_> {
-    fn run<I: Integrator>(
+    fn run(
         &mut self,
-        method: &I,
+        method: &Method,
         view: View<'_>,
         job: &Job<'_>,
         film: &mut Film,
         spent: Spent,
         keeper: &mut Keeper<'_>,
     ) -> Result<Outcome> {
-        let mut parts = method.parts(view.scene);
-        parts.push(Part::double_precision(view.scene));
+        let parts = method.parts(view.scene);
         if self.verbosity == Verbosity::Verbose {
             for part in &parts {
                 eprintln!("  {} {}: {}", if part.built { "built   " } else { "left out" }, part.name, part.why);
@@ -358,16 +346,7 @@ impl Task<'_> {
                 .map_or(" (interval unknown)".into(), |[low, high]| format!(" (95 %: {low:.4e} to {high:.4e})"));
             eprintln!("against the reference: RMSE {:.4e}{relative}{interval}", e.rmse);
         }
-        // Where there is no light, a lamp is inside, or a mesh has no inside or looks inwards, the warnings before have said why.
-        let inside_out = |o: &Object| o.findings.inside_out() || o.findings.zero_area == o.findings.triangles;
-        let told = scene.is_dark() || !scene.obstacles().is_empty() || scene.objects.iter().any(inside_out);
-        if outcome.tally.gather.samples > 0 && outcome.tally.gather.lit == 0 && !told {
-            eprintln!(
-                "warning: none of {} on translucent surfaces met any light: do the lights face them? (a light \
-                 shines along its outward normal; `two_sided = true` lets it shine both ways)",
-                counted(outcome.tally.gather.samples, "sample", "samples")
-            );
-        }
+        no_light(scene, &outcome.tally).iter().for_each(|line| eprintln!("warning: {line}"));
         let level = if outcome.tally.walk.lost_many() { "warning: " } else { "" };
         for sentence in lost(&outcome.tally.walk, scene) {
             eprintln!("{level}{sentence}");

@@ -1,6 +1,6 @@
 //! `marmor render --pixel x,y --pass n`: one sample again, with what it met.
 
-use super::setup::{Method, Prepared};
+use super::setup::Prepared;
 use marmor::Result;
 use marmor::integrator::View;
 use marmor::render::{self, Job};
@@ -16,12 +16,7 @@ pub fn run(prepared: &Prepared, view: View<'_>, job: &Job<'_>, pixel: [u32; 2], 
         let what = format!("--pixel {x},{y} is not in the picture of {width}x{height} pixels");
         return Err(marmor::Error::usage(what));
     }
-    let (radiance, tally) = match &prepared.method {
-        Method::AmbientOcclusion(method) => render::replay(method, view, job, pixel, pass),
-        Method::Direct(method) => render::replay(&**method, view, job, pixel, pass),
-        Method::Subsurface(method) => render::replay(&**method, view, job, pixel, pass),
-        Method::VolumePath(method) => render::replay(&**method, view, job, pixel, pass),
-    };
+    let (radiance, tally) = render::replay(&prepared.method, view, job, pixel, pass);
     let turn = Turn::of(job.seed, pass);
     let number = u64::from(y) * u64::from(width) + u64::from(x);
     let ray = view.scene.camera.ray(pixel, PixelStream::new(turn.seed, number, turn.number).next_2d());

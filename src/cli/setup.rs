@@ -1,16 +1,10 @@
-//! From a scene file and the options over it to a checked scene and a method: shared by `render` and `check`.
+//! Words on a command line that say what is computed, as options and keys of the scene: shared by all commands that render.
 
 use marmor::bssrdf::ModelName;
-use marmor::film::Film;
-use marmor::integrator::{
-    AmbientOcclusion, Direct, KnownLights, Part, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
-};
 use marmor::query::Backend;
-use marmor::render::{self, Job, Observer, Outcome};
-use marmor::sampling::Points;
-use marmor::scene::{
-    EntrySampling, Estimator, MethodName, MethodOptions, Orders, Scene, SceneFile, Spread, default_photons,
-};
+use marmor::render::Options;
+pub use marmor::render::{Method, Prepared};
+use marmor::scene::{Estimator, MethodName, SceneFile};
 use marmor::{Error, Result};
 use std::path::Path;
 
@@ -44,152 +38,20 @@ pub struct MethodArgs {
     define: Vec<String>,
 }
 
-/// A method with its tables.
-pub enum Method {
-    AmbientOcclusion(AmbientOcclusion),
-    Direct(Box<Direct>),
-    Subsurface(Box<Subsurface>),
-    VolumePath(Box<VolumePath>),
-}
-
-impl Method {
-    /// The name on the command line.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::AmbientOcclusion(_) => MethodName::AmbientOcclusion.name(),
-            Self::Direct(_) => MethodName::Direct.name(),
-            Self::Subsurface(_) => MethodName::Subsurface.name(),
-            Self::VolumePath(_) => MethodName::VolumePath.name(),
-        }
-    }
-
-    /// [`render::run`] with this method.
-    pub fn run(
-        &self,
-        view: View<'_>,
-        job: &Job<'_>,
-        film: &mut Film,
-        observers: &mut [&mut dyn Observer],
-    ) -> Result<Outcome> {
-        match self {
-            Self::AmbientOcclusion(m) => render::run(m, view, job, film, observers),
-            Self::Direct(m) => render::run(&**m, view, job, film, observers),
-            Self::Subsurface(m) => render::run(&**m, view, job, film, observers),
-            Self::VolumePath(m) => render::run(&**m, view, job, film, observers),
-        }
-    }
-
-    /// Memory of what a pass shares [bytes].
-    pub fn pass_bytes(&self, view: View<'_>) -> u64 {
-        use marmor::integrator::Integrator as _;
-        match self {
-            Self::AmbientOcclusion(m) => m.pass_bytes(view),
-            Self::Direct(m) => m.pass_bytes(view),
-            Self::Subsurface(m) => m.pass_bytes(view),
-            Self::VolumePath(m) => m.pass_bytes(view),
-        }
-    }
-
-    /// The lights that it must have found before its error is told.
-    pub fn lights(&self, scene: &Scene) -> KnownLights {
-        use marmor::integrator::Integrator as _;
-        match self {
-            Self::AmbientOcclusion(m) => m.lights(scene),
-            Self::Direct(m) => m.lights(scene),
-            Self::Subsurface(m) => m.lights(scene),
-            Self::VolumePath(m) => m.lights(scene),
-        }
-    }
-
-    /// Tables over the triangles of translucent objects [bytes/triangle].
-    pub fn bytes_per_triangle(&self) -> u64 {
-        match self {
-            Self::AmbientOcclusion(_) | Self::Direct(_) => 0,
-            Self::Subsurface(_) => 40,
-            Self::VolumePath(_) => 75,
-        }
-    }
-
-    /// What was built and what was left out.
-    pub fn parts(&self, scene: &Scene) -> Vec<Part> {
-        use marmor::integrator::Integrator as _;
-        let mut parts = match self {
-            Self::AmbientOcclusion(m) => m.parts(scene),
-            Self::Direct(m) => m.parts(scene),
-            Self::Subsurface(m) => m.parts(scene),
-            Self::VolumePath(m) => m.parts(scene),
-        };
-        parts.push(Part::double_precision(scene));
-        parts
-    }
-}
-
-/// Everything before rays.
-pub struct Prepared {
-    pub file: SceneFile,
-    pub scene: Scene,
-    pub method: Method,
-    pub backend: Backend,
-    pub seed: u64,
-    pub as_notes: bool,
-    /// Whether meshes were mended.
-    pub repair: bool,
-    estimator: Estimator,
-}
-
-impl Prepared {
-    /// Method, estimator and models in a few words.
-    pub fn describe(&self) -> String {
-        match self.method {
-            Method::Subsurface(_) => {
-                let models: Vec<&str> =
-                    self.scene.materials.iter().filter_map(|m| Some(m.surface.inside.as_ref()?.model.name())).collect();
-                let how = if self.as_notes { "as_notes" } else { self.estimator.name() };
-                format!("{} ({how}, {})", self.method.name(), models.join(", "))
-            }
-            _ => self.method.name().into(),
-        }
-    }
-
-    /// What the EXR header says of the method.
-    pub fn method_attributes(&self) -> Vec<(&'static str, String)> {
-        let Method::Subsurface(_) = self.method else { return Vec::new() };
-        let models: Vec<String> = self
-            .scene
-            .materials
-            .iter()
-            .filter_map(|m| Some(format!("{}: {}", m.name, m.surface.inside.as_ref()?.model_text())))
-            .collect();
-        vec![
-            ("model", models.join(", ")),
-            ("estimator", self.estimator.name().into()),
-            ("asNotes", self.as_notes.to_string()),
-        ]
-    }
-}
-
-/// Reads the meshes of a scene and checks it, and builds the tables of its method.
+/// [`Prepared::new`] with the options that decide what is computed.
 pub fn prepare(file: SceneFile, args: &MethodArgs) -> Result<Prepared> {
-    let mut scene = Scene::load_with(&file, args.repair)?;
-    if args.as_notes {
-        for material in &mut scene.materials {
-            if let Some(t) = &mut material.surface.inside {
-                t.exit_normalisation = false;
-            }
-        }
-    }
-    let seed = file.render.seed.unwrap_or(0);
-    let default = if args.as_notes { Estimator::Notes } else { Estimator::Cut };
-    let estimator = if args.as_notes { default } else { file.method.estimator.unwrap_or(default) };
-    let method = build(&scene, &file.method, args.as_notes, estimator, seed)?;
-    let backend = args.backend.unwrap_or(Backend::preferred());
-    Ok(Prepared { method, backend, seed, as_notes: args.as_notes, repair: args.repair, estimator, scene, file })
+    Prepared::new(file, &args.options())
 }
 
 impl MethodArgs {
     /// The scene file with the options in it.
     pub fn read(&self, path: &Path) -> Result<SceneFile> {
         SceneFile::read(path)?.with(&self.overrides())
+    }
+
+    /// What is no key of the scene file.
+    pub fn options(&self) -> Options {
+        Options { backend: self.backend, repair: self.repair, as_notes: self.as_notes, ..Options::default() }
     }
 
     /// The options as they are typed, for a line that runs the same again.
@@ -281,48 +143,4 @@ fn unknown_word(spec: &str, word: &str) -> String {
     let hint = marmor::error::did_you_mean(word, known.iter().copied());
     let all = known.join(", ");
     format!("`{spec}`: nothing is called `{word}`{hint}; there are {all}, a number of samples, or key=value")
-}
-
-fn build(scene: &Scene, options: &MethodOptions, as_notes: bool, estimator: Estimator, seed: u64) -> Result<Method> {
-    let name = options.name.unwrap_or_else(|| scene.default_method());
-    if as_notes && name != MethodName::Subsurface {
-        return Err(Error::usage(format!("--as-notes is about the method `subsurface`, not `{}`", name.name())));
-    }
-    let light_samples = options.light_samples.unwrap_or(1);
-    Ok(match name {
-        MethodName::AmbientOcclusion => Method::AmbientOcclusion(AmbientOcclusion {
-            radius: options.radius.map_or(f32::INFINITY, |r| r as f32),
-            rays: options.rays.unwrap_or(4),
-        }),
-        MethodName::Direct => Method::Direct(Direct::new(scene, light_samples)?.into()),
-        MethodName::Subsurface => {
-            let (entry, points) = if as_notes {
-                (EntrySampling::Cosine, Points::Independent)
-            } else {
-                (options.entry.unwrap_or(EntrySampling::Light), Points::Sobol)
-            };
-            let options = SubsurfaceOptions {
-                cache_samples: options.cache_samples.unwrap_or(estimator.default_samples()),
-                estimator,
-                cut_error: options.cut_error.map(|e| e as f32),
-                entry,
-                points,
-                spread: if as_notes { Spread::Area } else { options.spread.unwrap_or(Spread::Seen) },
-                specular: options.specular.unwrap_or(true),
-                single: options.single.unwrap_or(true),
-                light_samples,
-                seed,
-            };
-            Method::Subsurface(Box::new(Subsurface::new(scene, options)?))
-        }
-        MethodName::VolumePath => {
-            let options = VolumePathOptions {
-                orders: options.orders.unwrap_or(Orders::All),
-                photons: options.photons.unwrap_or_else(|| default_photons(scene.camera.resolution)),
-                specular: options.specular.unwrap_or(true),
-                seed,
-            };
-            Method::VolumePath(Box::new(VolumePath::new(scene, options)?))
-        }
-    })
 }

@@ -23,7 +23,7 @@ pub enum Attribute {
 pub struct Metadata {
     /// Samples per pixel: attribute `samplesPerPixel`.
     pub samples_per_pixel: u32,
-    /// Time spent on the picture [s]: attribute `renderTimeSeconds`. Left out where `created` is set, for such
+    /// Time spent on the picture \[s\]: attribute `renderTimeSeconds`. Left out where `created` is set, for such
     /// files are meant to be the same every time.
     pub render_seconds: Option<f64>,
     /// When the picture was made [s since 1970, UTC]: attribute `capDate`. See [`source_date_epoch`].

@@ -15,7 +15,7 @@ use crate::math::Rgb;
 use crate::{Error, ErrorKind, Result};
 use serde::Serialize;
 
-/// Side of the blocks whose spread gives the intervals [pixels].
+/// Side of the blocks whose spread gives the intervals \[pixels\].
 pub const BLOCK: u32 = 16;
 
 /// Share of pixels left out of the trimmed figures: those with the largest error.

@@ -22,15 +22,20 @@ mod sums;
 mod variance;
 mod window;
 
-pub use atomic::{check_replaceable, write_atomically};
-pub use checkpoint::{Checkpoint, Identity, checksum};
 pub use exr_file::{Attribute, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::{FilePicture, Image};
-pub use judge::{Bias, Brightness, Judged, Judgement, Truth, brightness, judge};
 pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, png_bytes, save, save_with_layers};
 pub use png_file::PngReport;
-pub use self_error::{FEWEST_PASSES, NoInterval, SelfError, SelfErrors, WorstPixel};
-pub use sums::{BadSample, Counts, Film};
-pub use variance::variance;
 pub use window::Window;
+
+// For the passes of `render` and for the program.
+#[doc(hidden)]
+pub use self::{
+    atomic::{check_replaceable, write_atomically},
+    checkpoint::{Checkpoint, Identity, checksum},
+    judge::{Bias, Brightness, Judged, Judgement, Truth, brightness, judge},
+    self_error::{FEWEST_PASSES, NoInterval, SelfError, SelfErrors, WorstPixel},
+    sums::{BadSample, Counts, Film},
+    variance::variance,
+};

@@ -8,6 +8,7 @@ use std::path::Path;
 
 /// Kinds of picture files that are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Format {
     /// Linear radiance, `f32`.
     Exr,

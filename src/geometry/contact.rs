@@ -26,7 +26,7 @@ pub struct Meeting {
     pub touching: Option<Contact>,
     /// A crossing or a touching of what is not looked for: small parts, a part with itself.
     pub minor: Option<Contact>,
-    /// Area over which such faces lie in each other [unit²].
+    /// Area over which such faces lie in each other \[unit²\].
     pub minor_area: f64,
     /// There were too many pairs of faces to look at.
     pub unfinished: bool,

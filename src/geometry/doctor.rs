@@ -26,11 +26,11 @@ pub struct Findings {
     pub non_manifold_edges: usize,
     /// Edges whose two triangles run along them the same way: one of the two faces the wrong way.
     pub mixed_edges: usize,
-    /// Enclosed volume [unit³], below zero if the faces look inwards; `None` where the surface has a rim, or faces of
+    /// Enclosed volume \[unit³\], below zero if the faces look inwards; `None` where the surface has a rim, or faces of
     /// mixed directions.
     pub volume: Option<f64>,
     /// Integral of the mean curvature over the surface [unit], above 0 on a convex body: half the sum over edges of length
-    /// times angle [Steiner]. With [`Self::volume`].
+    /// times angle \[Steiner\]. With [`Self::volume`].
     pub bend: Option<f64>,
 }
 

@@ -30,9 +30,9 @@ impl Face {
 pub struct Part {
     /// Whether each edge is run along as often one way as the other: then inside and outside are two things.
     pub closed: bool,
-    /// Enclosed volume [unit³] of a closed part, below zero where its faces look inwards; 0 for others.
+    /// Enclosed volume \[unit³\] of a closed part, below zero where its faces look inwards; 0 for others.
     pub volume: f64,
-    /// Area [unit²].
+    /// Area \[unit²\].
     pub area: f64,
     /// Smallest and largest corner of its box [unit].
     pub bounds: (DVec3, DVec3),

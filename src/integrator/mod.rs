@@ -73,7 +73,7 @@ pub trait Integrator: Sync {
         false
     }
 
-    /// Memory of what a pass shares, at its most while it is made [bytes]; may trace some rays to know.
+    /// Memory of what a pass shares, at its most while it is made \[bytes\]; may trace some rays to know.
     fn pass_bytes(&self, _view: View<'_>) -> u64 {
         0
     }

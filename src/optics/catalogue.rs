@@ -53,7 +53,7 @@ pub enum Coefficients {
     },
 }
 
-/// Volume of the measuring tank of [NGD06] [ml].
+/// Volume of the measuring tank of \[NGD06\] \[ml\].
 pub const TANK_ML: f64 = 23_000.0;
 
 /// Diffuse reflectance of a half space listed beside a row's coefficients.

@@ -7,9 +7,9 @@ use crate::math::{GaussLegendre, Rgb};
 /// Which closed form stands for the reflectance of a half space.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AlbedoLaw {
-    /// The standard dipole [JMLH01]; all orders of scattering. Nearest to transport for α′ above 0.9.
+    /// The standard dipole \[JMLH01\]; all orders of scattering. Nearest to transport for α′ above 0.9.
     Standard,
-    /// The better dipole [dEo12] alone: orders from two upwards.
+    /// The better dipole \[dEo12\] alone: orders from two upwards.
     Better,
     /// The better dipole and exact single scattering at normal incidence, isotropic by similarity. Passes 1 for α′
     /// above some 0.999.
@@ -116,7 +116,7 @@ fn single_scattering(eta: f64) -> f64 {
 }
 
 /// The medium that reflects `colour` under white diffuse light by `law`, with transport mean free path `length`
-/// [unit], mean cosine `g` and relative index `eta`.
+/// \[unit\], mean cosine `g` and relative index `eta`.
 ///
 /// # Errors
 /// A colour outside [0, 1], a length that is not positive and finite, and all that [`Medium::checked`] refuses.

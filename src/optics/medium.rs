@@ -138,12 +138,12 @@ impl Medium {
         self.each(|k| k.alpha_prime)
     }
 
-    /// Mean free path 1 / σ_t [unit]; infinite where there is no medium.
+    /// Mean free path 1 / σ_t \[unit\]; infinite where there is no medium.
     pub fn mean_free_path(&self) -> Rgb {
         self.sigma_t().map(|s| 1.0 / s)
     }
 
-    /// Transport mean free path 1 / σ_t′ [unit]; infinite where there is no medium.
+    /// Transport mean free path 1 / σ_t′ \[unit\]; infinite where there is no medium.
     pub fn transport_mean_free_path(&self) -> Rgb {
         self.each(|k| 1.0 / k.sigma_t_prime)
     }

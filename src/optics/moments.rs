@@ -20,7 +20,7 @@ pub struct FresnelMoments {
 impl FresnelMoments {
     /// The moments of a boundary with relative index `eta` > 0, to 1e-12 or better for `eta` in 0.2..5.
     ///
-    /// The fits of [dEI11] are not used: they miss 0 at eta = 1, and their terms cancel in f32.
+    /// The fits of \[dEI11\] are not used: they miss 0 at eta = 1, and their terms cancel in f32.
     pub fn new(eta: f64) -> Self {
         debug_assert!(eta > 0.0);
         if eta >= 1.0 {
@@ -41,12 +41,12 @@ impl FresnelMoments {
         Self { two_c1, three_c2, c_phi: 0.25 * one_minus_two_c1, c_e: 0.5 * (1.0 - three_c2), four_c_phi_outside }
     }
 
-    /// A of the extrapolated boundary after Groenhuis, (1 + F_dr) / (1 - F_dr) [JMLH01].
+    /// A of the extrapolated boundary after Groenhuis, (1 + F_dr) / (1 - F_dr) \[JMLH01\].
     pub fn a_groenhuis(&self) -> f64 {
         (1.0 + self.two_c1) / (4.0 * self.c_phi)
     }
 
-    /// A with both moments, (1 + 3 C_2) / (1 - 2 C_1) [dEo12].
+    /// A with both moments, (1 + 3 C_2) / (1 - 2 C_1) \[dEo12\].
     pub fn a_mixed(&self) -> f64 {
         (1.0 + self.three_c2) / (4.0 * self.c_phi)
     }

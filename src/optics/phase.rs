@@ -3,7 +3,7 @@
 use crate::math::Vec3;
 use std::f64::consts::PI;
 
-/// Henyey-Greenstein [HG41] with mean cosine g in (-1, 1). Cosines are between directions of propagation: 1 is
+/// Henyey-Greenstein \[HG41\] with mean cosine g in (-1, 1). Cosines are between directions of propagation: 1 is
 /// straight on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HenyeyGreenstein {

@@ -14,11 +14,11 @@ pub struct ChannelOptics {
     pub alpha: f64,
     /// Mean cosine of the phase function.
     pub g: f64,
-    /// Mean free path 1 / σ_t [unit]; infinite where there is no medium.
+    /// Mean free path 1 / σ_t \[unit\]; infinite where there is no medium.
     pub mean_free_path: f64,
-    /// Transport mean free path 1 / σ_t′ [unit].
+    /// Transport mean free path 1 / σ_t′ \[unit\].
     pub transport_mean_free_path: f64,
-    /// Diffusion length 1 / σ_tr = 1 / sqrt(3 σ_a σ_t′) [unit]; infinite without absorption.
+    /// Diffusion length 1 / σ_tr = 1 / sqrt(3 σ_a σ_t′) \[unit\]; infinite without absorption.
     pub diffusion_length: f64,
 }
 

@@ -80,7 +80,7 @@ pub trait RayQuery: Send + Sync {
     /// Name and version, for logs and file headers.
     fn description(&self) -> String;
 
-    /// Memory of the tree itself [bytes], where the backend knows it.
+    /// Memory of the tree itself \[bytes\], where the backend knows it.
     fn bytes(&self) -> Option<usize> {
         None
     }
@@ -148,7 +148,7 @@ fn has_area(corners: [Vec3; 3]) -> bool {
     (b - a).cross(c - a).length() > 0.0
 }
 
-/// Builds a backend over `meshes`, which it copies: [`exact`] where one of them asks for [`Precision::Double`].
+/// Builds a backend over `meshes`, which it copies: [`exact()`] where one of them asks for [`Precision::Double`].
 ///
 /// # Errors
 /// A usage error if the backend is not in this build, or a library does not work.

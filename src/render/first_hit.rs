@@ -21,9 +21,9 @@ pub enum Seen {
     Albedo,
     /// Shading normal, turned towards the camera. Mean over the pixel, so shorter than 1 along edges; 0 without a surface.
     Normal,
-    /// Place in the scene file's coordinates [unit], through the pixel's middle; 0 without a surface.
+    /// Place in the scene file's coordinates \[unit\], through the pixel's middle; 0 without a surface.
     Place,
-    /// Distance along the direction of view [unit] in all channels, through the pixel's middle; infinite without a surface.
+    /// Distance along the direction of view \[unit\] in all channels, through the pixel's middle; infinite without a surface.
     Depth,
     /// Expected error of the material's model, 0.05 for 5 %, NaN where it has not been measured; thickness in transport mean
     /// free paths of the channel that decides, NaN where there is no other side, and mean curvature. Means over what is

@@ -35,9 +35,9 @@ pub fn shares(view: View<'_>, window: Window) -> Vec<f64> {
 pub struct Aim {
     /// The object to look at: a translucent one if there is any, else one that is no lamp, else any.
     pub object: String,
-    /// A place of it, or its middle, in the coordinates of the scene file [unit].
+    /// A place of it, or its middle, in the coordinates of the scene file \[unit\].
     pub at: DVec3,
-    /// The angle between the direction of view and the direction there [degrees].
+    /// The angle between the direction of view and the direction there \[degrees\].
     pub degrees: f64,
 }
 

@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 pub struct Compared {
     /// As asked.
     pub name: String,
-    /// Time of rendering [s].
+    /// Time of rendering \[s\].
     pub seconds: f64,
     /// Samples of each pixel.
     pub samples: u32,

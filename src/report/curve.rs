@@ -8,7 +8,7 @@ use crate::film::{Judged, Judgement, SelfErrors};
 pub struct Curve {
     /// As asked.
     pub name: String,
-    /// Building its trees and tables [s]; not in the times of the points.
+    /// Building its trees and tables \[s\]; not in the times of the points.
     pub seconds_setup: f64,
     /// In order of time.
     pub points: Vec<Point>,
@@ -21,7 +21,7 @@ pub struct Curve {
 pub struct Point {
     /// Samples of each pixel.
     pub samples: u32,
-    /// Time of rendering [s].
+    /// Time of rendering \[s\].
     pub seconds: f64,
     /// Over all pixels, and without the worst 0.1 %, by which methods are judged.
     pub judgement: Judgement,

@@ -20,9 +20,9 @@ pub struct Run {
 /// One ring of exit points.
 #[derive(Clone, Copy, Debug)]
 pub struct Bin {
-    /// Inner radius [mm].
+    /// Inner radius \[mm\].
     pub r_min: f64,
-    /// Outer radius [mm].
+    /// Outer radius \[mm\].
     pub r_max: f64,
     /// Share of the entered flux that leaves in the ring after one scattering.
     pub once: f64,

@@ -17,13 +17,13 @@ pub struct Record {
     pub pass: u32,
     /// Samples of each pixel.
     pub samples: u32,
-    /// Reading the scene and building trees and tables [s].
+    /// Reading the scene and building trees and tables \[s\].
     pub seconds_setup: f64,
-    /// Filling caches [s].
+    /// Filling caches \[s\].
     pub seconds_cache: f64,
-    /// Tracing, shading and gathering [s].
+    /// Tracing, shading and gathering \[s\].
     pub seconds_gather: f64,
-    /// Setup, cache and gathering; writing and measuring are not in it [s].
+    /// Setup, cache and gathering; writing and measuring are not in it \[s\].
     pub seconds_total: f64,
     /// The same in parts.
     pub clock: Clock,

@@ -8,7 +8,7 @@ use crate::query::Ray;
 pub struct Camera {
     /// Pixels across and down.
     pub resolution: [u32; 2],
-    /// Pinhole [unit], relative to the scene's centre.
+    /// Pinhole \[unit\], relative to the scene's centre.
     pub origin: DVec3,
     /// Unit direction of view.
     forward: Vec3,

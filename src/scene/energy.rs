@@ -32,7 +32,7 @@ pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>
 /// is 0, 1/2, 2/3.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shape {
-    /// Way through it along the normal [unit].
+    /// Way through it along the normal \[unit\].
     pub thickness: f64,
     /// Mean curvature [1/unit]: 0 of a sheet, 1/2r of a rod, 1/r of a ball.
     pub curvature: f64,

@@ -19,7 +19,7 @@ pub struct EnvironmentEntry {
     pub image: Option<PathBuf>,
     /// The layer of an EXR file that has several.
     pub layer: Option<String>,
-    /// Turns the picture about the y axis [degrees], counterclockwise as seen from above.
+    /// Turns the picture about the y axis \[degrees\], counterclockwise as seen from above.
     pub turn: f64,
 }
 
@@ -31,7 +31,7 @@ pub struct Environment {
     /// All directions, in equal steps of longitude to the right and of latitude downwards: +y is the upper edge, +z the
     /// middle, +x a quarter from the left. No value is negative or not finite.
     pub image: Option<Arc<Image>>,
-    /// Counterclockwise turn of the picture about the y axis as seen from above [turns].
+    /// Counterclockwise turn of the picture about the y axis as seen from above \[turns\].
     pub turn: f32,
 }
 

@@ -18,7 +18,7 @@ use crate::math::{DVec3, Rgb};
 pub struct SceneFile {
     /// Where it was read from; meshes are looked for beside it.
     pub path: PathBuf,
-    /// Length of one unit [mm]; `None` if the file does not say.
+    /// Length of one unit \[mm\]; `None` if the file does not say.
     pub unit_in_mm: Option<f64>,
     /// `[camera]`.
     pub camera: CameraEntry,
@@ -38,13 +38,13 @@ pub struct SceneFile {
 /// `[camera]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CameraEntry {
-    /// Pinhole [unit].
+    /// Pinhole \[unit\].
     pub position: DVec3,
-    /// A point in the middle of the picture [unit].
+    /// A point in the middle of the picture \[unit\].
     pub look_at: DVec3,
     /// Upwards in the picture, of any length; need not be orthogonal to the view.
     pub up: DVec3,
-    /// Full angle of view [degrees], in (0, 180).
+    /// Full angle of view \[degrees\], in (0, 180).
     pub fov: f64,
     /// The side of the picture that `fov` spans.
     pub fov_axis: FovAxis,
@@ -94,7 +94,8 @@ impl SceneFile {
     }
 
     /// The file with options of the form `path.to.key=value` put over it, in order; lists count from 0
-    /// (`object.0.material=marble`). A value that is no TOML is taken as text.
+    /// (`object.0.material=marble`). A value that is no TOML is taken as text. It is made of what was typed: fields changed
+    /// since then are not in it.
     ///
     /// # Errors
     /// A usage error if the form or a list's number is wrong; a scene error, naming the option, if the value is.

@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use super::file::{FovAxis, SceneFile, unit_vector};
 use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
-use super::{Camera, Insides, Material, Object, ObstacleKind, Scene, Surface, Translucent, precision, warnings};
+use super::{
+    Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
+};
 use crate::error::{Error, Result};
 use crate::geometry::{
     Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere,
@@ -79,10 +81,11 @@ impl Scene {
         let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath);
         for (number, what) in choice.beyond {
             let entry = &file.objects[number];
-            // An open sheet is not too thin besides.
-            let object = &scene.objects[number];
-            let open = object.findings.open_edges > 0 && scene.has(object, ObstacleKind::Sheet);
-            if !models_or_paths || !open {
+            // What encloses nothing is not too thin besides, where that is said.
+            let name = &scene.objects[number].name;
+            let sheet = |o: &Obstacle| o.kind == ObstacleKind::Sheet && o.objects.contains(name);
+            let said_so = |o: &Obstacle| sheet(o) && o.warning(method).is_some();
+            if !models_or_paths || !scene.obstacles().iter().any(said_so) {
                 said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
             }
         }

@@ -22,17 +22,17 @@ mod view;
 mod warnings;
 mod world;
 
-pub use camera::Camera;
-pub use difference::difference;
-pub use doctor::Remark;
-pub use environment::{Environment, EnvironmentEntry};
+pub use environment::EnvironmentEntry;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
 pub use obstacle::{Obstacle, ObstacleKind};
-pub use obstacles::Insides;
-pub use options::{
-    EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread, default_photons,
-};
-pub use view::View;
+pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread};
 pub use world::{Emission, Material, Object, Scene, Surface, Translucent};
+
+// For what is above this room.
+#[doc(hidden)]
+pub use self::{
+    camera::Camera, difference::difference, doctor::Remark, environment::Environment, obstacles::Insides,
+    options::default_photons, view::View,
+};

@@ -32,23 +32,24 @@ pub struct ObjectEntry {
 
 /// Where triangles come from.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Geometry {
     /// An OBJ file, as typed: relative to the scene file.
     Mesh(PathBuf),
     /// See [`crate::geometry::rectangle`].
     Rectangle {
-        /// Middle [unit].
+        /// Middle \[unit\].
         centre: DVec3,
-        /// Half of one edge [unit].
+        /// Half of one edge \[unit\].
         edge_u: DVec3,
-        /// Half of the other [unit]; the outside is where `edge_u` x `edge_v` points.
+        /// Half of the other \[unit\]; the outside is where `edge_u` x `edge_v` points.
         edge_v: DVec3,
     },
     /// See [`crate::geometry::sphere`].
     Sphere {
-        /// Middle [unit].
+        /// Middle \[unit\].
         centre: DVec3,
-        /// Distance of the vertices from it [unit], > 0.
+        /// Distance of the vertices from it \[unit\], > 0.
         radius: f64,
         /// Bands from pole to pole, 2 to 4096.
         rings: u32,
@@ -62,7 +63,7 @@ pub enum Geometry {
 pub struct Transform {
     /// Scale and rotation, with an inverse.
     pub linear: DMat3,
-    /// Shift [unit].
+    /// Shift \[unit\].
     pub translate: DVec3,
 }
 

@@ -7,6 +7,7 @@ macro_rules! named {
     ($(#[$doc:meta])* $type:ident, $what:literal, $($(#[$variant_doc:meta])* $variant:ident = $name:literal),+) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
         pub enum $type {
             $($(#[$variant_doc])* $variant),+
         }
@@ -122,7 +123,7 @@ named! {
 pub struct MethodOptions {
     /// Which method.
     pub name: Option<MethodName>,
-    /// Ambient occlusion: surfaces beyond this distance do not count [unit], > 0.
+    /// Ambient occlusion: surfaces beyond this distance do not count \[unit\], > 0.
     pub radius: Option<f64>,
     /// Ambient occlusion: rays per camera ray, 1 to 65536.
     pub rays: Option<u32>,
@@ -157,6 +158,6 @@ pub struct RenderOptions {
     pub spp: Option<u32>,
     /// Seed of all random numbers, 0 to 2^63 - 1.
     pub seed: Option<u64>,
-    /// Exposure of the PNG [stops], -64 to 64.
+    /// Exposure of the PNG \[stops\], -64 to 64.
     pub exposure: Option<f64>,
 }

@@ -135,9 +135,9 @@ struct Probe {
     x: DVec3,
     inwards: DVec3,
     triangle: u32,
-    /// How far from the surface a ray in f32 would start [unit].
+    /// How far from the surface a ray in f32 would start \[unit\].
     offset: f64,
-    /// How far the other side is looked for [unit].
+    /// How far the other side is looked for \[unit\].
     reach: f64,
     /// Way to the other side; infinite beyond the reach.
     thickness: f64,

@@ -13,9 +13,9 @@ use std::sync::Arc;
 pub struct Scene {
     /// Where it came from, for messages.
     pub name: String,
-    /// Length of one unit [mm]; `None` if the file does not say.
+    /// Length of one unit \[mm\]; `None` if the file does not say.
     pub unit_in_mm: Option<f64>,
-    /// Where the scene's own origin lies in file coordinates [unit]: the centre of the translucent objects, or of all where
+    /// Where the scene's own origin lies in file coordinates \[unit\]: the centre of the translucent objects, or of all where
     /// there are none. Numbers are finest there.
     pub centre: DVec3,
     /// The camera.
@@ -116,7 +116,7 @@ pub struct Translucent {
     pub medium: Medium,
     /// BSSRDF model asked for.
     pub model: ModelName,
-    /// Thickness of a slab [unit], for the models `slab` and `auto`.
+    /// Thickness of a slab \[unit\], for the models `slab` and `auto`.
     pub thickness: Option<f32>,
     /// The model `directional` scaled to the true albedo.
     pub calibrated: bool,

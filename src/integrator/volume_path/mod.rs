@@ -22,7 +22,7 @@ use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
-use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface};
+use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
 use crate::tally::{Cause, RayTally, Tally, WalkTally};
 use crate::words::short;
 use body::Body;
@@ -46,6 +46,13 @@ pub struct VolumePathOptions {
     pub specular: bool,
     /// Seed of the render.
     pub seed: u64,
+}
+
+impl Default for VolumePathOptions {
+    /// Photons for a picture of 512x512 pixels.
+    fn default() -> Self {
+        Self { orders: Orders::All, photons: default_photons([512; 2]), specular: true, seed: 0 }
+    }
 }
 
 /// Unbiased light transport: Lambertian surfaces, lamps, environment, and homogeneous media with Henyey-Greenstein
