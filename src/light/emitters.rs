@@ -178,7 +178,11 @@ impl Lights {
     /// Light from a random point of the area lights, picked by power and area; `None` where it comes from behind
     /// the surface or leaves the light at its dark side.
     pub fn sample_emitter(&self, scene: &Scene, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
-        let lamp = self.point(scene, u)?;
+        Self::from_point(&self.point(scene, u)?, at)
+    }
+
+    /// Light from `lamp`; `None` as in [`Self::sample_emitter`].
+    pub fn from_point(lamp: &LampPoint, at: &SurfacePoint) -> Option<Arrival> {
         let to_light = (lamp.at.x - at.x).as_vec3();
         let distance = to_light.length();
         if distance <= 0.0 {

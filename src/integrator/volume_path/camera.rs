@@ -264,10 +264,9 @@ impl Watch for Gather<'_, '_> {
         if path.method.options.orders.none_above(path.order) {
             return false;
         }
-        let (source, cells) = (&path.method.sources[body.object as usize], path.photons.get(body.object as usize));
-        let photons = source.as_ref().zip(cells.and_then(Option::as_ref));
-        if let (Some((source, _)), Some(edge), true) = (photons, edge, path.direct > 0.0) {
-            let share = walked_share(source.yielding, source.reach, edge.length, edge.phase);
+        let photons = path.photons.get(body.object as usize).and_then(Option::as_ref);
+        if let (Some(cells), Some(edge), true) = (photons, edge, path.direct > 0.0) {
+            let share = walked_share(cells, edge.length, edge.phase);
             if share < 1.0 && draws.number() >= share {
                 path.direct = 0.0;
                 // What has been weighted up before goes on for certain: no weight is above the inverse of the chance.
@@ -297,9 +296,9 @@ impl Watch for Gather<'_, '_> {
                 return false;
             }
         }
-        if let (Some((source, cells)), true) = (photons, orders.contains(path.order + 1)) {
+        if let (Some(cells), true) = (photons, orders.contains(path.order + 1)) {
             let (coins, tally) = (&mut path.coins, &mut path.tally.walk);
-            let light = connect(path.view, body, (cells, source.yielding), (x, w), path.scratch, coins, tally);
+            let light = connect(path.view, body, cells, (x, w), path.scratch, coins, tally);
             // Radiance falls by η² on its way out.
             path.radiance += spectrum.value(&body.medium) * light * (path.direct / (body.eta * body.eta));
         }

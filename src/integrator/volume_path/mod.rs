@@ -8,6 +8,7 @@ mod cells;
 mod checks;
 mod connect;
 mod draws;
+mod emission;
 mod facets;
 mod pencil;
 mod photons;
@@ -86,7 +87,7 @@ impl VolumePath {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
             let scatters = body.medium.albedo.max() > 0.0;
-            scatters.then(|| Source::new(scene, body, &lights, options.photons, reach, options.seed)).flatten()
+            scatters.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
         };
         let sources = bodies.iter().map(source).collect();
         let diffuse =
@@ -228,7 +229,7 @@ impl Integrator for VolumePath {
         let fill = |(source, body): (&Option<Source>, &Option<Body>)| {
             let (source, body) = (source.as_ref()?, body.as_ref()?);
             let mut work = (RayTally::default(), WalkTally::default());
-            let cells = source.trace(view, body, &self.light.lights, pass, &mut work);
+            let cells = source.trace(view, body, &self.light.lights, pass, &mut work)?;
             tally.rays += work.0;
             tally.walk += work.1;
             tally.walk.photons += u64::from(source.count);
