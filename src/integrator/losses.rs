@@ -1,5 +1,6 @@
-//! Paths that came where no light can be: how many, at which object, and why.
+//! Paths that came where no light can be, or to no end: how many, at which object, and why.
 
+use super::MOST_SURFACES;
 use crate::scene::{ObstacleKind, Scene};
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,8 @@ pub enum Cause {
     Blemish,
     /// Inside the object it met another medium.
     OtherMedium,
+    /// It was given up: nothing absorbed it, surface after surface.
+    Endless,
     /// The mesh is sound: a rounded coordinate came to lie on the other side of a face.
     Rounding,
 }
@@ -132,6 +135,9 @@ fn why(scene: &Scene, name: &str, cause: Cause) -> String {
                 format!("they met {} inside it: move them apart, or make one mesh of both", others.join(", "))
             }
         }
+        Cause::Endless => format!(
+            "nothing absorbed them on {MOST_SURFACES} surfaces in a row: an albedo below 1, some sigma_a or an opening lets them end"
+        ),
         Cause::Rounding => {
             "rounding put them on the other side of its surface: make what is thinnest thicker, or bring \
                             what is far away nearer"

@@ -27,7 +27,7 @@ pub use losses::{Cause, Loss, Losses, TOLERATED};
 pub use met::KnownLights;
 pub use subsurface::{Subsurface, SubsurfaceOptions};
 pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness, Verdict};
-pub use volume_path::{Left, VolumePath, VolumePathOptions};
+pub use volume_path::{Left, MOST_SURFACES, VolumePath, VolumePathOptions};
 
 /// The scene and the backend that was built for it.
 #[derive(Clone, Copy)]
@@ -96,7 +96,7 @@ pub struct WalkTally {
     pub vertices: u64,
     /// Kept collisions looked at from camera paths.
     pub connections: u64,
-    /// Paths that came where no light can be, by object and cause: they carry nothing.
+    /// Paths that came where no light can be or to no end, by object and cause: they carry nothing.
     pub losses: Losses,
 }
 

@@ -25,6 +25,7 @@ use crate::query::{Hit, RayTally};
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface};
 use body::Body;
+pub use body::MOST_SURFACES;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 use connect::Scratch;
