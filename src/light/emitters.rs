@@ -46,7 +46,7 @@ impl Lights {
                 continue;
             }
             let (Some(table), Some(bounds)) = (AreaTable::new(&o.mesh), o.mesh.bounds()) else { continue };
-            power += table.area() * f64::from(radiance.mean()) * if two_sided { 2.0 } else { 1.0 };
+            power += table.area() * radiance.mean_f64() * if two_sided { 2.0 } else { 1.0 };
             cumulative.push(power);
             emitters.push(Emitter { object: object as u32, table, radiance, two_sided, pdf_area: 0.0, bounds });
         }
