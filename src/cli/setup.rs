@@ -181,6 +181,10 @@ pub fn prepare(file: SceneFile, args: &MethodArgs) -> Result<Prepared> {
     let default = if args.as_notes { Estimator::Notes } else { Estimator::Cut };
     let estimator = if args.as_notes { default } else { file.method.estimator.unwrap_or(default) };
     let method = build(&scene, &file.method, args.as_notes, estimator, seed)?;
+    if let Method::VolumePath(m) = &method {
+        let warnings = m.warnings(&scene);
+        scene.warnings.extend(warnings);
+    }
     let backend = args.backend.unwrap_or(Backend::preferred());
     Ok(Prepared { method, backend, seed, as_notes: args.as_notes, repair: args.repair, estimator, scene, file })
 }

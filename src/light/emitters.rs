@@ -106,6 +106,11 @@ impl Lights {
         self.sky.radiance_of_suns()
     }
 
+    /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
+    pub fn solid_angle_of_suns(&self) -> f32 {
+        self.sky.solid_angle_of_suns()
+    }
+
     /// A direction of the suns, picked by what they send; `None` without any.
     pub fn sun(&self, u: [f32; 3]) -> Option<SunDirection> {
         self.sky.sun(u)

@@ -56,6 +56,11 @@ impl Sky {
         self.suns.as_ref().map_or(0.0, |suns| suns.radiance * self.radiance.mean())
     }
 
+    /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
+    pub fn solid_angle_of_suns(&self) -> f32 {
+        self.suns.as_ref().map_or(0.0, |suns| suns.solid_angle)
+    }
+
     /// A direction of the suns, by what they send.
     pub fn sun(&self, u: [f32; 3]) -> Option<SunDirection> {
         let (picture, suns) = (self.picture.as_ref()?, self.suns.as_ref()?);

@@ -16,6 +16,14 @@ const SLAB_FROM: f64 = 2.0;
 /// Why `volume_path` is no remedy for the object; see [`super::Scene::untraceable`].
 type Untraceable<'a> = dyn Fn() -> Option<String> + 'a;
 
+impl Object {
+    /// Way through it along the normal [unit], as of the sheet, rod or ball that it is most like; `None` for a mesh that
+    /// encloses nothing.
+    pub fn thickness(&self) -> Option<f64> {
+        Shape::of(self).map(|shape| shape.thickness)
+    }
+}
+
 /// What is to say of the energy of an object's model; nothing where it is as good as on a plane.
 pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>) -> Vec<String> {
     let Ok(model) = t.build() else { return Vec::new() };

@@ -6,6 +6,7 @@ mod camera;
 mod cells;
 #[cfg(test)]
 mod checks;
+mod clear;
 mod connect;
 mod draws;
 mod emission;
@@ -99,6 +100,11 @@ impl VolumePath {
         let persistence = beside.sqrt().max(least);
         let light = DirectLight { lights, samples: 1 };
         Ok(Self { options, light, bodies, sources, persistence, camera_in: scene.camera_in(), once: false })
+    }
+
+    /// What to say of `scene` before it is rendered: light that may not be found.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        clear::warning(scene, &self.light.lights).into_iter().collect()
     }
 
     fn shade(
