@@ -46,7 +46,7 @@ impl Scene {
             }
             let findings = examine(&mesh);
             let (name, at) = (entry.name.clone(), entry.at.clone());
-            objects.push(Object { name, mesh, at, material: entry.material, findings });
+            objects.push(Object { name, mesh, at, material: entry.material, flipped: entry.flip, findings });
         }
         let mut scene = Self {
             name: file.path.display().to_string(),

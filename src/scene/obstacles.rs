@@ -123,6 +123,10 @@ impl Obstacle {
     }
 }
 
+/// After so many pairs of objects that meet, only those are looked at of which one has not met any yet: in a heap of thousands every pair
+/// may.
+const MOST_MEETINGS: usize = 1000;
+
 /// What is inside what in a scene, once somebody has asked; see [`Scene::obstacles`].
 #[derive(Debug, Default)]
 pub struct Insides(OnceLock<Found>);
@@ -210,9 +214,14 @@ impl Found {
             let solid = alone(scene, body, &mut found.obstacles);
             found.look_from(scene, body, solid);
         }
+        let (mut meet, mut meets) = (0, vec![false; bodies.len()]);
         for (i, j) in pairs {
-            if let (Some(a), Some(b)) = (&bodies[i], &bodies[j]) {
-                found.obstacles.extend(pair(scene, a, b));
+            if let (Some(a), Some(b)) = (&bodies[i], &bodies[j])
+                && !(meet > MOST_MEETINGS && meets[i] && meets[j])
+                && let Some(obstacle) = pair(scene, a, b)
+            {
+                (meet, meets[i], meets[j]) = (meet + 1, true, true);
+                found.obstacles.push(obstacle);
             }
         }
         found
@@ -257,6 +266,9 @@ fn near(scene: &Scene, contact: &Contact) -> String {
     format!("near [{:.4}, {:.4}, {:.4}]", p.x, p.y, p.z)
 }
 
+const TURN: &str = "set flip = true, or --repair turns them";
+const TURN_BACK: &str = "leave out flip = true, or --repair turns them";
+
 /// What is wrong with one medium's mesh by itself; whether it has an inside.
 fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
     let (solid, name) = (&body.solid, &body.object.name);
@@ -273,7 +285,7 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
                 _ => false,
             },
             what: format!("object {name:?}: {what}"),
-            remedy: remedy.into(),
+            remedy: if remedy == TURN && body.object.flipped { TURN_BACK.into() } else { remedy.into() },
         });
     };
     let area: f64 = solid.parts.iter().map(|p| p.area).sum();
@@ -397,7 +409,7 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
     if turned.0 > 0 {
         let kind = if turned.1 > MINOR * area { ObstacleKind::Turned } else { ObstacleKind::Blemish };
         let what = format!("{} of its {all} parts look inwards with nothing around them", turned.0);
-        say(kind, what, "set flip = true, or --repair turns them");
+        say(kind, what, TURN);
     }
 }
 
