@@ -67,33 +67,53 @@ fn lamp(name: &str, [x, y, z]: [f64; 3], u: [f64; 3], v: [f64; 3]) -> String {
     )
 }
 
-/// A white cube in a closed box of lamps, near on all sides but one: a white furnace, so that all that is seen is 1.
+/// A white cube, seen from above; `lights` beside it.
+fn cube(folder: &Path, lights: &str) -> Scene {
+    cuboid(folder, [1.0; 3]);
+    let text = format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 4.5, 0.01]\nlook_at = [0, 0, 0]\nfov = 25\nresolution = [8, 8]\n\
+         [[object]]\nname = \"cube\"\nmesh = \"box.obj\"\nmaterial = \"white\"\n[material.white]\ntype = \"translucent\"\n\
+         sigma_s = 3\nsigma_a = 0\ng = 0\neta = 1.3\n{lights}"
+    );
+    load(&text, folder)
+}
+
+/// A closed box of lamps around it, `gap` away on all sides but the camera's.
+fn lamps_around(gap: f64, two_sided: bool) -> String {
+    let (r, top) = (1.0 + gap, 5.0);
+    let (middle, half) = (0.5 * (top - r), 0.5 * (top + r));
+    let walls = lamp("floor", [0.0, -r, 0.0], [0.0, 0.0, r], [r, 0.0, 0.0])
+        + &lamp("ceiling", [0.0, top, 0.0], [r, 0.0, 0.0], [0.0, 0.0, r])
+        + &lamp("left", [-r, middle, 0.0], [0.0, half, 0.0], [0.0, 0.0, r])
+        + &lamp("right", [r, middle, 0.0], [0.0, 0.0, r], [0.0, half, 0.0])
+        + &lamp("back", [0.0, middle, -r], [r, 0.0, 0.0], [0.0, half, 0.0])
+        + &lamp("front", [0.0, middle, r], [0.0, half, 0.0], [r, 0.0, 0.0]);
+    format!("{walls}[material.lamp]\ntype = \"emissive\"\nradiance = 1\ntwo_sided = {two_sided}\n")
+}
+
+/// A white furnace: all that is seen is 1.
 #[test]
 fn lamps_all_around_at_any_gap_are_a_furnace() {
     let folder = tempfile::tempdir().unwrap();
-    cuboid(folder.path(), [1.0; 3]);
     for (gap, two_sided) in [(1.0, false), (0.1, true), (1e-2, false), (1e-3, true), (1e-4, false)] {
-        let (r, top) = (1.0 + gap, 5.0);
-        let (middle, half) = (0.5 * (top - r), 0.5 * (top + r));
-        let walls = lamp("floor", [0.0, -r, 0.0], [0.0, 0.0, r], [r, 0.0, 0.0])
-            + &lamp("ceiling", [0.0, top, 0.0], [r, 0.0, 0.0], [0.0, 0.0, r])
-            + &lamp("left", [-r, middle, 0.0], [0.0, half, 0.0], [0.0, 0.0, r])
-            + &lamp("right", [r, middle, 0.0], [0.0, 0.0, r], [0.0, half, 0.0])
-            + &lamp("back", [0.0, middle, -r], [r, 0.0, 0.0], [0.0, half, 0.0])
-            + &lamp("front", [0.0, middle, r], [0.0, half, 0.0], [r, 0.0, 0.0]);
-        let text = format!(
-            "unit = \"mm\"\n[camera]\nposition = [0, 4.5, 0.01]\nlook_at = [0, 0, 0]\nfov = 25\nresolution = [8, 8]\n\
-             [[object]]\nname = \"cube\"\nmesh = \"box.obj\"\nmaterial = \"white\"\n[material.white]\ntype = \"translucent\"\n\
-             sigma_s = 3\nsigma_a = 0\ng = 0\neta = 1.3\n{walls}[material.lamp]\ntype = \"emissive\"\nradiance = 1\n\
-             two_sided = {two_sided}\n"
-        );
-        let found = mean(&load(&text, folder.path()), OPTIONS, 32);
+        let found = mean(&cube(folder.path(), &lamps_around(gap, two_sided)), OPTIONS, 32);
         agree(found, (1.0, 0.0), 0.006, &format!("gap {gap}, two-sided {two_sided}"));
     }
 }
 
-/// A slab over a panel, seen from above, with photons and without; the light that is scattered once alone, too, which comes by
-/// points of the lamp.
+/// Light scattered once, for which points of the lamps are asked, is that of an even sky, which is met by chance.
+#[test]
+fn light_scattered_once_beside_lamps_is_that_of_a_sky() {
+    let folder = tempfile::tempdir().unwrap();
+    let once = VolumePathOptions { orders: Orders::Single, specular: false, ..OPTIONS };
+    let sky = mean(&cube(folder.path(), "[environment]\nradiance = 1\n"), once, 128);
+    for gap in [0.1, 1e-2, 1e-3, 1e-4] {
+        let lamps = mean(&cube(folder.path(), &lamps_around(gap, false)), once, 128);
+        agree(lamps, sky, 0.01, &format!("once, gap {gap}"));
+    }
+}
+
+/// A slab over a panel, seen from above, with photons and without.
 #[test]
 fn a_panel_under_a_slab_shines_through_as_without_photons() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,6 @@
 use super::file::SceneFile;
 use super::options::MethodName;
 use super::{Object, Scene, Surface, Translucent, energy};
-use crate::bssrdf::{Bssrdf, ModelVisitor};
 use crate::geometry::Solid;
 use crate::optics::{ChannelOptics, Trust};
 
@@ -38,15 +37,8 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
 
 /// Models of orders 2 and higher want single scattering beside them.
 pub(super) fn no_first_order(t: &Translucent) -> Option<String> {
-    struct FirstOrder;
-    impl ModelVisitor for FirstOrder {
-        type Out = bool;
-        fn visit<B: Bssrdf>(self, model: &B) -> bool {
-            model.claims().first_order
-        }
-    }
     let model = t.build().ok()?;
-    (!model.visit(FirstOrder)).then(|| {
+    (!energy::has_first_order(&model)).then(|| {
         let name = model.name().name();
         format!("`{name}` leaves out light scattered once, and `single = false` too: some 10 % of the light is missing")
     })
