@@ -164,3 +164,31 @@ fn bad_pictures_are_refused_or_mended_aloud() {
     let sky = Sky::new(&scene.environment);
     assert_eq!(sky.radiance(Vec3::Z), Rgb([0.0, 0.0, 2.0]));
 }
+
+/// The largest number of single precision in one pixel, as some programs write it for a missing value, hides no other; and a
+/// factor that brings a pixel beyond it is refused by name.
+#[test]
+fn pixels_at_the_end_of_single_precision_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let picture = |bright: f32| {
+        Image::from_fn([64, 32], |x, y| if [x, y] == [40, 20] { Rgb::splat(bright) } else { Rgb([0.3, 0.6, 0.9]) })
+    };
+    let largest = scene(folder.path(), &picture(f32::MAX), WHITE);
+    assert!(largest.warnings.iter().any(|w| w.contains("pixel 40,20 is (3.4028235e38")), "{:?}", largest.warnings);
+    let sky = Sky::new(&largest.environment);
+    assert!(!sky.is_black());
+    let up = sky.radiance(Vec3::Y);
+    assert!((up[0] - 0.3).abs() < 1e-6 && (up[1] - 0.6).abs() < 1e-6 && (up[2] - 0.9).abs() < 1e-6, "{up:?}");
+    assert_eq!(scene(folder.path(), &picture(1e6), WHITE).warnings, Vec::<String>::new());
+    let text = format!("{BODY}[environment]\nimage = \"sky.exr\"\nradiance = 1e37\n{WHITE}");
+    let error = Scene::load(&SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap()).err().unwrap();
+    for words in [
+        "[environment]",
+        "sky.exr",
+        "pixel 40,20 is (1e6, 1e6, 1e6)",
+        "radiance = (1e37, 1e37, 1e37)",
+        "smaller `radiance`",
+    ] {
+        assert!(error.to_string().contains(words), "{words}: {error}");
+    }
+}

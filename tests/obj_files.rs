@@ -67,6 +67,7 @@ fn obj_files_with_more_than_is_read_say_so() {
         ("v 1 2 3 1 0\nf 1 2 3", "1 vertex has further numbers (2 after x y z in line 5)"),
         ("cstype bezier\nsurf 0 1 0 1 1 2 3 4\nend\ncurv 0 1 1 2\nf 1 2 3", "2 free-form curves or surfaces are left out (the first, `surf`, in line 6)"),
         ("vertex 1 2 3\nf 1 2 3", "1 line begins with a word that OBJ does not have (the first, `vertex`, in line 5)"),
+        ("call other.obj\ncsh make\nf 1 2 3", "2 lines call for other files or for commands (the first, `call`, in line 5)"),
         ("vn 0 0 1\nf 1//1 2//1 3", "1 face has normals at some corners only (the first in line 6)"),
         ("vn 0 0 1\nf 1 2 3", "no face refers to its one normal"),
         ("v 1 -1 0\nf 1 2 3 4\nf 1 4 2 3", "2 of 2 polygons cross or cover themselves (the first in line 6)"),

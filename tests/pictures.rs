@@ -261,6 +261,9 @@ fn exposures_and_primaries_of_a_header_count() {
     let exposed = read("EXPOSURE=4\nEXPOSURE=0.5\n\tEXPOSURE=7\nCOLORCORR=1 2 0.5\n").unwrap();
     assert_eq!(exposed.image.pixels[0], Rgb([1.0, 0.5, 2.0]));
     assert_eq!(exposed.remarks, ["its values were divided by the exposure that it names (2, 4, 1)"]);
+    let seen = read("GAMMA=2.2\nVIEW= -vtv -vp 0 0 0\n\tVIEW= -vtl\n").unwrap();
+    assert_eq!(seen.image.pixels[0], Rgb::splat(2.0));
+    assert_eq!(seen.remarks, ["its header has `GAMMA=2.2`, `VIEW=-vtv -vp 0 0 0`, which is not heeded"]);
     // Greys stay grey; XYZ of equal energy is white, 179 times brighter.
     near(grey("PRIMARIES=0.64 0.33 0.29 0.6 0.15 0.06 0.333 0.333\n"), [2.0; 3], 2e-3);
     near(grey("FORMAT=32-bit_rle_xyze\n"), [2.0 / 179.0; 3], 1e-6);

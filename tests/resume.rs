@@ -91,6 +91,16 @@ fn seconds_of_all_runs_add_up() {
     }
 }
 
+/// A film that has all its passes tells no error of them, and says why.
+#[test]
+fn a_film_that_is_complete_says_that_this_run_made_no_pass() {
+    let folder = folder(1.0);
+    let call = ["-o", "x.film", "-o", "x.exr", "--resume", "--spp", "8"];
+    assert!(!ok(folder.path(), &call).contains("no relMSE"));
+    let told = ok(folder.path(), &call);
+    assert!(told.contains("no relMSE is estimated: all 8 passes were there before, and this run made none"), "{told}");
+}
+
 /// The film that an earlier call asked for, under the name that a checkpoint would have.
 #[test]
 fn a_film_that_was_asked_for_is_never_taken_away() {

@@ -294,3 +294,33 @@ fn single_scattering_beside_models_finds_suns() {
     println!("left out: {missing:.4} +- {:.4}", some.1.hypot(all.1) / all.0);
     assert!((-0.02..0.15).contains(&missing), "{some:?} of {all:?}");
 }
+
+/// What no shadow ray finds is said before a render, and nothing of what is found.
+#[test]
+fn small_lights_behind_clear_bodies_are_said() {
+    let floor = "[[object]]\nname = \"floor\"\nshape = \"rectangle\"\ncentre = [0, -1.5, 0]\nedge_u = [0, 0, 4]\nedge_v = [4, 0, 0]\n\
+                 material = \"grey\"\n[material.grey]\ntype = \"diffuse\"\nalbedo = 0.5\n";
+    let lamp = |half: f64| {
+        format!(
+            "{floor}[[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [0, 5, 0]\nedge_u = [{half}, 0, 0]\n\
+             edge_v = [0, 0, {half}]\nmaterial = \"lamp\"\n[material.lamp]\ntype = \"emissive\"\nradiance = 1\n"
+        )
+    };
+    let said = |scene: &Scene| VolumePath::new(scene, OPTIONS).unwrap().warnings(scene).join("\n");
+    let (glass, milk) = ("sigma_s = 0\nsigma_a = 0\ng = 0\neta = 1.5", "sigma_s = 20\nsigma_a = 0\ng = 0\neta = 1.3");
+    let words = said(&ball(glass, &lamp(0.1)));
+    for word in ["light of \"lamp\" that comes through \"ball\"", "by chance alone", "larger or softer lights"] {
+        assert!(words.contains(word), "{word}: {words}");
+    }
+    assert!(said(&sunny(ball(glass, floor), 0.5)).contains("the bright part of the environment's picture"));
+    // A wide lamp, a dense body, nothing to show the light, an even sky.
+    for scene in [
+        ball(glass, &lamp(2.0)),
+        ball(milk, &lamp(0.1)),
+        ball(glass, lamp(0.1).strip_prefix(floor).unwrap()),
+        under(ball(glass, floor), [16, 8], |_| 1.0),
+        sunny(ball(milk, floor), 0.5),
+    ] {
+        assert_eq!(said(&scene), "");
+    }
+}

@@ -63,7 +63,11 @@ impl OwnError {
             );
         }
         let Some(told) = self.get() else {
-            return format!("no relMSE is estimated: {passes} of the 2 passes that it needs");
+            return if passes < 2 {
+                format!("no relMSE is estimated: {passes} of the 2 passes that it needs")
+            } else {
+                format!("no relMSE is estimated: all {passes} passes were there before, and this run made none")
+            };
         };
         let Some(relmse) = told.relmse else { return "no relMSE is estimated: the picture is black".into() };
         let out = format!("estimated relMSE {:.2e}", relmse.value);

@@ -62,6 +62,8 @@ struct Header {
     factors: [f64; 3],
     primaries: Option<Primaries>,
     aspect: f64,
+    /// Lines of the header that say how the picture is to be seen or taken, as they are written.
+    ignored: Vec<String>,
     /// Lines of pixels, and pixels in each.
     lines: u32,
     length: u32,
@@ -79,6 +81,7 @@ impl Header {
             factors: [1.0; 3],
             primaries: None,
             aspect: 1.0,
+            ignored: Vec::new(),
             lines: 0,
             length: 0,
             columns: false,
@@ -135,6 +138,7 @@ impl Header {
                 let [aspect] = numbers()?[..] else { return Err(()) };
                 self.aspect *= factor(aspect)?;
             }
+            "GAMMA" | "VIEW" => self.ignored.push(shown(&format!("{name}={value}"))),
             _ => {}
         }
         self.factors.iter().try_for_each(|&f| factor(f).map(drop))
@@ -176,6 +180,9 @@ impl Header {
         let mut remarks = Vec::new();
         if (self.aspect - 1.0).abs() > 1e-3 {
             remarks.push(format!("its pixels are {} times as high as wide, which is not heeded", self.aspect));
+        }
+        if !self.ignored.is_empty() {
+            remarks.push(format!("its header has `{}`, which is not heeded", self.ignored.join("`, `")));
         }
         let primaries = if self.xyz { Some(XYZ) } else { self.primaries };
         let found = primaries.map_or(Ok(None), Primaries::to_rec709)?;

@@ -1,7 +1,7 @@
 //! The lines of an OBJ file on their way to `tobj`: counted, so that a complaint can name one, and reduced to what we
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
-use super::obj_remarks::{CURVED, KNOWN, OddLines};
+use super::obj_remarks::{CALLS, CURVED, KNOWN, OddLines};
 use crate::words::either;
 use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
@@ -242,6 +242,8 @@ impl<R: BufRead> ObjLines<R> {
                     let word = || shown(&String::from_utf8_lossy(keyword));
                     if is(CURVED) {
                         self.odd.curved.count(word, line);
+                    } else if is(CALLS) {
+                        self.odd.calls.count(word, line);
                     } else if !is(KNOWN) {
                         self.odd.unknown.count(word, line);
                     }

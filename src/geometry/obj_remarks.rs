@@ -8,6 +8,8 @@ use crate::words::{counted, either};
 pub(super) struct OddLines {
     /// Free-form curves and surfaces.
     pub curved: Seen<String>,
+    /// Lines that call for other files or for commands.
+    pub calls: Seen<String>,
     /// Lines whose first word is none of OBJ's.
     pub unknown: Seen<String>,
     /// Vertices with a fourth number other than 1.
@@ -73,9 +75,10 @@ pub(super) const KNOWN: &[&str] = &[
     "trace_obj",
     "ctech",
     "stech",
-    "call",
-    "csh",
 ];
+
+/// Other files, and commands of the system.
+pub(super) const CALLS: &[&str] = &["call", "csh"];
 
 /// Free-form geometry, the patches of version 2 included.
 pub(super) const CURVED: &[&str] = &["curv", "curv2", "surf", "bzp", "bsp", "cdc", "cdp", "res"];
@@ -98,6 +101,12 @@ impl OddLines {
                 format!(
                     "{what} left out (the first, `{word}`, in line {line}): only polygons are \
                      read; convert them in the modelling program"
+                )
+            }),
+            self.calls.say(|n, word, line| {
+                format!(
+                    "{n} lines call for other files or for commands (the first, `{word}`, in line {line}) and are left out: what \
+                     they would bring is missing"
                 )
             }),
             self.unknown.say(|n, word, line| {

@@ -30,7 +30,7 @@ pub use met::KnownLights;
 pub use parts::Part;
 pub use subsurface::Subsurface;
 pub use trust::{ModelOnBody, TOLERANCE, Trustworthiness, Verdict};
-pub use volume_path::{Left, VolumePath, VolumePathOptions};
+pub use volume_path::{Left, MOST_SURFACES, VolumePath, VolumePathOptions};
 
 /// One sample of one pixel.
 #[derive(Clone, Copy, Debug)]

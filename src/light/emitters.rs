@@ -46,7 +46,7 @@ impl Lights {
                 continue;
             }
             let (Some(table), Some(bounds)) = (AreaTable::new(&o.mesh), o.mesh.bounds()) else { continue };
-            power += table.area() * f64::from(radiance.mean()) * if two_sided { 2.0 } else { 1.0 };
+            power += table.area() * radiance.mean_f64() * if two_sided { 2.0 } else { 1.0 };
             cumulative.push(power);
             emitters.push(Emitter { object: object as u32, table, radiance, two_sided, pdf_area: 0.0, bounds });
         }
@@ -104,6 +104,11 @@ impl Lights {
     /// Mean radiance of the suns, by what they send; 0 without any.
     pub fn radiance_of_suns(&self) -> f32 {
         self.sky.radiance_of_suns()
+    }
+
+    /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
+    pub fn solid_angle_of_suns(&self) -> f32 {
+        self.sky.solid_angle_of_suns()
     }
 
     /// A direction of the suns, picked by what they send; `None` without any.
@@ -178,7 +183,11 @@ impl Lights {
     /// Light from a random point of the area lights, picked by power and area; `None` where it comes from behind
     /// the surface or leaves the light at its dark side.
     pub fn sample_emitter(&self, scene: &Scene, at: &SurfacePoint, u: [f32; 3]) -> Option<Arrival> {
-        let lamp = self.point(scene, u)?;
+        Self::from_point(&self.point(scene, u)?, at)
+    }
+
+    /// Light from `lamp`; `None` as in [`Self::sample_emitter`].
+    pub fn from_point(lamp: &LampPoint, at: &SurfacePoint) -> Option<Arrival> {
         let to_light = (lamp.at.x - at.x).as_vec3();
         let distance = to_light.length();
         if distance <= 0.0 {

@@ -56,6 +56,11 @@ impl Sky {
         self.suns.as_ref().map_or(0.0, |suns| suns.radiance * self.radiance.mean())
     }
 
+    /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
+    pub fn solid_angle_of_suns(&self) -> f32 {
+        self.suns.as_ref().map_or(0.0, |suns| suns.solid_angle)
+    }
+
     /// A direction of the suns, by what they send.
     pub fn sun(&self, u: [f32; 3]) -> Option<SunDirection> {
         let (picture, suns) = (self.picture.as_ref()?, self.suns.as_ref()?);
@@ -160,7 +165,7 @@ impl Picture {
         for k in 0..=height {
             let mut row = 0.0;
             let sums = (0..width).map(|i| {
-                row += picture.corners(k, i).iter().map(|p| f64::from(p.mean())).sum::<f64>();
+                row += picture.values(k, i).iter().sum::<f64>();
                 row
             });
             let sums: Vec<f64> = sums.collect();
@@ -193,7 +198,7 @@ impl Picture {
     /// Means over the channels at the corners of the patch `i` of row `k`, in the order of [`Self::corners`].
     #[inline]
     pub(super) fn values(&self, k: usize, i: usize) -> [f64; 4] {
-        self.corners(k, i).map(|p| p.mean().into())
+        self.corners(k, i).map(Rgb::mean_f64)
     }
 
     /// Where in the row `k` of patches the cosine `y` from +y lies, even in solid angle.
@@ -350,6 +355,16 @@ pub(super) mod tests {
             let sphere = whole / count as f64 / (4.0 * PI64);
             assert!((sphere - 1.0).abs() < 0.05, "{resolution:?}: {sphere}");
         }
+    }
+
+    /// Three of the largest numbers of single precision have a sum beyond it.
+    #[test]
+    fn the_brightest_pixel_there_can_be_hides_no_other() {
+        let pixel = |x, y| Rgb::splat(if [x, y] == [40, 20] { f32::MAX } else { 0.5 });
+        let sky = sky([64, 32], 0.0, pixel);
+        assert!(!sky.is_black() && sky.has_suns());
+        let sun = sky.sun([0.5; 3]).unwrap();
+        assert!(sun.pdf_angle.is_finite() && sky.radiance(-sun.w) == Rgb::WHITE, "{sun:?}");
     }
 
     #[test]

@@ -24,6 +24,8 @@ pub struct Suns {
     pub beside: f32,
     /// Mean over suns, by what they send.
     pub radiance: f32,
+    /// Of an even light with the same power and the same square of radiance [sr].
+    pub solid_angle: f32,
 }
 
 impl Suns {
@@ -39,6 +41,7 @@ impl Suns {
             power: 0.0,
             beside: 1.0,
             radiance: 0.0,
+            solid_angle: 0.0,
         };
         let mut squares = 0.0;
         for (k, i) in patches() {
@@ -54,6 +57,7 @@ impl Suns {
         suns.cumulative.iter_mut().for_each(|c| *c /= power);
         suns.beside = (1.0 - power / total).max(0.0) as f32;
         suns.radiance = (squares / power) as f32;
+        suns.solid_angle = (power / squares * power) as f32;
         (squares / (4.0 * PI * all * all) > TROUBLE).then_some(suns)
     }
 

@@ -44,6 +44,11 @@ impl Rgb {
         (self.0[0] + self.0[1] + self.0[2]) / 3.0
     }
 
+    /// The same where the sum of the channels may leave the range of f32.
+    pub fn mean_f64(self) -> f64 {
+        self.0.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0
+    }
+
     /// True where no channel is NaN or infinite.
     #[inline]
     pub fn is_finite(self) -> bool {

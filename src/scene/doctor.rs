@@ -52,11 +52,16 @@ pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
     }
     if let Some(volume) = found.volume.filter(|_| found.inside_out()) {
         let effect = match (translucent, one_sided) {
-            (true, _) => "light enters from outside only, so it stays dark; set flip = true, or --repair turns it",
-            (_, true) => "it shines inwards; set flip = true, or --repair turns it",
+            (true, _) => "light enters from outside only, so it stays dark",
+            (_, true) => "it shines inwards",
             _ => "harmless, both sides are alike",
         };
-        say(one_sided, format!("its faces look inwards (volume {} unit³): {effect}", short(volume)));
+        let remedy = match (one_sided, object.flipped) {
+            (true, true) => "; leave out flip = true, or --repair turns it",
+            (true, false) => "; set flip = true, or --repair turns it",
+            _ => "",
+        };
+        say(one_sided, format!("its faces look inwards (volume {} unit³): {effect}{remedy}", short(volume)));
     }
     if let Some(seam) = found.seam {
         let Seam { within, share, corners, closed } = seam;

@@ -67,6 +67,9 @@ pub(super) fn read(top: &Fields<'_>) -> Result<EnvironmentEntry> {
     })
 }
 
+/// No light is as bright; programs write such numbers for want of a value.
+const FILLER: f32 = 1e30;
+
 impl EnvironmentEntry {
     /// Reads the picture, which is looked for in `folder`; what is odd about it goes to `said`.
     pub(super) fn load(&self, folder: &Path, said: &mut Vec<String>) -> Result<Environment> {
@@ -111,6 +114,33 @@ impl EnvironmentEntry {
                 either(dropped, "counts", "count")
             ));
         }
+        self.in_range(&path, &image, said)?;
         Ok(Environment { radiance: self.radiance, image: Some(Arc::new(image)), turn })
+    }
+
+    /// Whether all of the picture times the factor is in the range of f32; pixels near its end are said.
+    fn in_range(&self, path: &Path, image: &Image, said: &mut Vec<String>) -> Result<()> {
+        let bright = |i: usize| image.pixels[i].max();
+        let Some(brightest) = (0..image.pixels.len()).max_by(|&a, &b| bright(a).total_cmp(&bright(b))) else {
+            return Ok(());
+        };
+        let name = |i: usize| {
+            let ([x, y], [r, g, b]) = (image.window.pixel(i), image.pixels[i].0);
+            format!("pixel {x},{y} is ({r:e}, {g:e}, {b:e})")
+        };
+        if let Some(i) = (0..image.pixels.len()).find(|&i| !(self.radiance * image.pixels[i]).is_finite()) {
+            let [r, g, b] = self.radiance.0;
+            let why = format!(
+                "{}, which times radiance = ({r:e}, {g:e}, {b:e}) is beyond single precision ({:e}): use a smaller `radiance`",
+                name(i),
+                f32::MAX
+            );
+            return Err(Error::file(path, "use", why).within("[environment]"));
+        }
+        if bright(brightest) > FILLER {
+            let what = "if that stands for a value that is missing, mend the picture: it outshines all others";
+            said.push(format!("{}: {}; {what}", path.display(), name(brightest)));
+        }
+        Ok(())
     }
 }

@@ -53,7 +53,7 @@ impl Scene {
             let findings = examine(&mesh);
             said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
             let (name, at) = (entry.name.clone(), entry.at.clone());
-            objects.push(Object { name, mesh, at, material: entry.material, findings });
+            objects.push(Object { name, mesh, at, material: entry.material, flipped: entry.flip, findings });
         }
         let mut scene = Self {
             name: file.path.display().to_string(),

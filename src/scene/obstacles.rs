@@ -19,6 +19,10 @@ const LEAST: f64 = 1e-4;
 /// A mesh of which more than this share is holes has no inside.
 const MOSTLY_HOLES: f64 = 0.05;
 
+/// After so many pairs of objects that meet, only those are looked at of which one has not met any yet: in a heap of thousands every pair
+/// may.
+const MOST_MEETINGS: usize = 1000;
+
 /// What is inside what in a scene, once somebody has asked; see [`Scene::obstacles`].
 #[derive(Debug, Default)]
 pub struct Insides(OnceLock<Found>);
@@ -106,9 +110,14 @@ impl Found {
             let solid = alone(scene, body, &mut found.obstacles);
             found.look_from(scene, body, solid);
         }
+        let (mut meet, mut meets) = (0, vec![false; bodies.len()]);
         for (i, j) in pairs {
-            if let (Some(a), Some(b)) = (&bodies[i], &bodies[j]) {
-                found.obstacles.extend(pair(scene, a, b));
+            if let (Some(a), Some(b)) = (&bodies[i], &bodies[j])
+                && !(meet > MOST_MEETINGS && meets[i] && meets[j])
+                && let Some(obstacle) = pair(scene, a, b)
+            {
+                (meet, meets[i], meets[j]) = (meet + 1, true, true);
+                found.obstacles.push(obstacle);
             }
         }
         found
@@ -153,6 +162,9 @@ fn near(scene: &Scene, contact: &Contact, gap: f64) -> String {
     format!("near {}", words::place((contact.at + scene.centre).to_array(), least))
 }
 
+const TURN: &str = "set flip = true, or --repair turns them";
+const TURN_BACK: &str = "leave out flip = true, or --repair turns them";
+
 /// What is wrong with one medium's mesh by itself; whether it has an inside.
 fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
     let (solid, name) = (&body.solid, &body.object.name);
@@ -169,7 +181,7 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
                 _ => false,
             },
             what: format!("object {name:?}: {what}"),
-            remedy: remedy.into(),
+            remedy: if remedy == TURN && body.object.flipped { TURN_BACK.into() } else { remedy.into() },
         });
     };
     let area: f64 = solid.parts.iter().map(|p| p.area).sum();
@@ -315,7 +327,7 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
             either(turned.0, "looks inwards with nothing around it", "look inwards with nothing around them"),
         );
         let what = if all == 1 { "its faces look inwards".into() } else { format!("{n} of its {all} parts {look}") };
-        say(kind, what, "set flip = true, or --repair turns them");
+        say(kind, what, TURN);
     }
 }
 

@@ -3,6 +3,7 @@
 use super::file::SceneFile;
 use super::options::MethodName;
 use super::{ObstacleKind, Scene, Translucent, energy};
+use crate::geometry::Solid;
 use crate::optics::{ChannelOptics, Trust};
 use crate::words::{albedo, short};
 
@@ -17,6 +18,7 @@ pub(super) fn of(file: &SceneFile, scene: &Scene) -> Vec<String> {
     materials(file, scene, &mut said);
     objects(file, scene, &mut said);
     light(file, scene, &mut said);
+    said.extend(shut_in(file, scene));
     said
 }
 
@@ -122,4 +124,30 @@ fn light(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             file.path.display()
         ));
     }
+}
+
+/// The camera in a closed body that lets no light in and has no lamp inside.
+fn shut_in(file: &SceneFile, scene: &Scene) -> Option<String> {
+    let (eye, boxes) = (scene.camera.origin, scene.objects.iter().map(|o| o.mesh.bounds()));
+    let boxes: Vec<_> = boxes.collect();
+    let shines = |o: &super::Object| scene.materials[o.material].surface.shines();
+    let holds_camera = |&i: &usize| {
+        let (object, Some((lo, hi))) = (&scene.objects[i], boxes[i]) else { return false };
+        let opaque = scene.materials[object.material].surface.is_opaque();
+        let lamp_near = || {
+            let mut others = scene.objects.iter().zip(&boxes);
+            others.any(|(o, b)| shines(o) && b.is_some_and(|b| b.0.cmple(hi).all() && b.1.cmpge(lo).all()))
+        };
+        opaque
+            && object.findings.open_edges == 0
+            && eye.cmpge(lo).all()
+            && eye.cmple(hi).all()
+            && !lamp_near()
+            && Solid::new(&object.mesh).winding(eye, |_| true).is_some_and(|w| w != 0)
+    };
+    let i = (0..scene.objects.len()).find(holds_camera)?;
+    let (at, name) = (&file.objects[i].at, &scene.objects[i].name);
+    Some(format!(
+        "{at}: object {name:?}: the camera is inside it, it is closed and no lamp is in it: all that is seen there is black"
+    ))
 }

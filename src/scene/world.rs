@@ -44,6 +44,8 @@ pub struct Object {
     pub at: String,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// Whether its faces were turned over by `flip = true`.
+    pub flipped: bool,
     /// What is wrong with the mesh.
     pub findings: Findings,
 }

@@ -1,4 +1,4 @@
-//! Paths that came where no light can be: how many, at which object, and why.
+//! Paths that came where no light can be, or to no end: how many, at which object, and why.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +14,8 @@ pub enum Cause {
     Blemish,
     /// Inside the object it met another medium.
     OtherMedium,
+    /// It was given up: nothing absorbed it, surface after surface.
+    Endless,
     /// The mesh is sound: a rounded coordinate came to lie on the other side of a face.
     Rounding,
 }

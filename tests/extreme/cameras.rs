@@ -114,3 +114,17 @@ fn what_to_look_at(scene: &marmor::scene::Scene, backend: Backend) -> Option<Aim
     let window = Window::full(scene.camera.resolution);
     nothing_in_view(view, window, &shares(view, window))
 }
+
+#[test]
+fn a_camera_in_a_closed_opaque_body_warns() {
+    let around =
+        "shape = \"sphere\"\ncentre = [0, 1, 6]\nradius = 0.5\nrings = 8\nsegments = 16\nmaterial = \"grey\"\n";
+    let shut = format!("{BASE}[[object]]\nname = \"hood\"\n{around}");
+    for shot in warns(&load(&shut).unwrap(), &["\"hood\": the camera is inside it", "no lamp is in it"]) {
+        assert!(shot.image.pixels.iter().all(|p| p.is_black()), "{}", shot.what);
+    }
+    // A lamp in it, or around all of it: a room.
+    let room = shut.replacen("centre = [0, 4, 0]", "centre = [0, 1, 6.3]", 1);
+    let room = room.replacen("edge_u = [1, 0, 0]\nedge_v = [0, 0, 1]", "edge_u = [0.1, 0, 0]\nedge_v = [0, 0, 0.1]", 1);
+    assert!(!load(&room).unwrap().warnings.join("\n").contains("the camera is inside"));
+}

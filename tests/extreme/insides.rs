@@ -384,3 +384,22 @@ fn a_camera_in_the_surface_of_a_body_refused() {
     let scene = from("[0, 1, 0]", WHITE);
     refuses(&scene, ObstacleKind::CameraTouching, &["the camera stands in the surface of object \"fog\"", "move it"]);
 }
+
+/// Each of them is named, but not each of twenty thousand pairs.
+#[test]
+fn hundreds_of_bodies_in_one_place_refused() {
+    let mut text =
+        "unit = \"mm\"\n[camera]\nposition = [0.3, 0.2, 9]\nlook_at = [0, 0, 0]\nfov = 20\nresolution = [8, 8]\n\
+                    [material.wax]\ntype = \"translucent\"\nsigma_s = 1\nsigma_a = 0\ng = 0\neta = 1.3\n"
+            .to_string();
+    let all = 200;
+    for i in 0..all {
+        text += &format!("[[object]]\nname = \"{i}\"\nmesh = \"a.obj\"\nmaterial = \"wax\"\n");
+    }
+    let scene = load_with(&text, &[("a.obj", &cube(0.0))], false).unwrap();
+    let found = traceable(&scene);
+    assert!(found.len() < 1000 + all + 2, "{}", found.len());
+    for i in 0..all {
+        assert!(found.iter().any(|o| o.objects.contains(&i.to_string())), "{i}");
+    }
+}

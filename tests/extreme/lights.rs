@@ -1,7 +1,7 @@
 //! Lights at the ends of what there is.
 
 use super::furnace::{self, ERRORS};
-use super::harness::{load, medium, ok, shots, warns, with};
+use super::harness::{load, load_with, medium, ok, shots, warns, with};
 use marmor::bssrdf::ModelName;
 use marmor::integrator::{VolumePath, VolumePathOptions};
 use marmor::query::Backend;
@@ -124,4 +124,16 @@ fn no_more_light_than_the_brightest_source_ok() {
             assert!(mean < most + ERRORS * error + 1e-4, "{what}: {mean} +- {error} of {most}");
         }
     }
+}
+
+#[test]
+fn a_flipped_lamp_that_shines_inwards_warns() {
+    let faces = "v 0 3 0\nv 1 3 0\nv 0 4 0\nv 0 3 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    let lamp = |flip: &str| {
+        let mesh = format!("mesh = \"lamp.obj\"\n{flip}");
+        with(&[("shape = \"rectangle\"\ncentre = [0, 4, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 0, 1]", &mesh)])
+    };
+    let flipped = load_with(&lamp("flip = true"), &[("lamp.obj", faces)], false).unwrap();
+    warns(&flipped, &["it shines inwards; leave out flip = true, or --repair turns it"]);
+    ok(&load_with(&lamp(""), &[("lamp.obj", faces)], false).unwrap());
 }

@@ -98,6 +98,7 @@ impl Body {
                 at: String::new(),
                 mesh,
                 material: 0,
+                flipped: false,
                 findings: Findings::default(),
             }],
             materials: vec![Material { name: "body".into(), surface: Surface::translucent(translucent) }],

@@ -84,10 +84,10 @@ impl Straight {
     }
 }
 
-/// Surface events in a row after which a path goes on by chance, lest it circle for ever without absorption.
-const PATIENT_BOUNCES: u32 = 64;
-/// That chance.
-const BOUNCE_SURVIVAL: f32 = 0.9;
+/// Surfaces in a row after which a path is given up, and counted as lost: light that nothing absorbs can be caught for ever, by
+/// total reflection in a box or between white walls. Not by chance any sooner: a path that has kept its weight would have to
+/// carry more than it, without a bound on its variance.
+pub const MOST_SURFACES: u32 = 100_000;
 /// A path that has lost more than this part of its weight goes on by chance.
 const ROULETTE_BELOW: f32 = 0.25;
 
@@ -176,7 +176,7 @@ impl Body {
     /// lost, which is counted with its cause.
     ///
     /// A path whose weight has fallen goes on with a chance in proportion to what is left, and is weighted by its
-    /// inverse. There is no limit of bounces.
+    /// inverse. There is no limit of collisions, and one of [`MOST_SURFACES`] between two.
     pub fn walk(
         &self,
         view: View<'_>,
@@ -227,8 +227,10 @@ impl Body {
                 }
                 Flight::Opaque(at, t, albedo) => {
                     spectrum.fly(t);
+                    let before = spectrum.value(&self.medium).max();
                     spectrum.scale(albedo);
-                    if albedo.is_black() || !survives(albedo.max(), spectrum, draws) {
+                    let left = spectrum.value(&self.medium).max();
+                    if left <= 0.0 || !survives(left / before, spectrum, draws) {
                         return None;
                     }
                     w = cosine_hemisphere(at.n_geometric, draws.pair());
@@ -244,7 +246,8 @@ impl Body {
                     return None;
                 }
             }
-            if bounces > PATIENT_BOUNCES && !survives(BOUNCE_SURVIVAL, spectrum, draws) {
+            if bounces >= MOST_SURFACES {
+                tally.losses.add(self.object, Cause::Endless);
                 return None;
             }
         }

@@ -1,7 +1,7 @@
 //! A path from the camera through the whole scene.
 
 use super::VolumePath;
-use super::body::{Body, Edge, Straight, Watch, survives};
+use super::body::{Body, Edge, MOST_SURFACES, Straight, Watch, survives};
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
@@ -15,7 +15,7 @@ use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::{Orders, Surface};
-use crate::tally::{Tally, WalkTally};
+use crate::tally::{Cause, Tally, WalkTally};
 use std::f32::consts::FRAC_1_PI;
 
 /// A path and what it has found.
@@ -44,10 +44,6 @@ pub struct CameraPath<'a> {
     pub radiance: Rgb,
 }
 
-/// Surfaces in a row after which a path goes on by chance, and the chance.
-const PATIENT_BOUNCES: u32 = 16;
-const BOUNCE_SURVIVAL: f32 = 0.8;
-
 impl<'a> CameraPath<'a> {
     /// Adds light of the present order.
     fn add(&mut self, light: Rgb) {
@@ -56,7 +52,8 @@ impl<'a> CameraPath<'a> {
         }
     }
 
-    /// Follows `ray` outside all bodies until nothing is left.
+    /// Follows `ray` outside all bodies until nothing is left. Each surface that absorbs ends it by chance; it is given up
+    /// after [`MOST_SURFACES`] alone.
     pub fn trace(&mut self, mut ray: Ray) {
         for bounces in 0_u32.. {
             self.tally.rays.bounce += 1;
@@ -65,7 +62,8 @@ impl<'a> CameraPath<'a> {
                 return;
             };
             let Some(next) = self.meet(&hit, ray.direction) else { return };
-            if bounces >= PATIENT_BOUNCES && !survives(BOUNCE_SURVIVAL, &mut self.spectrum, &mut self.draws) {
+            if bounces >= MOST_SURFACES {
+                self.lose(hit.mesh, Cause::Endless);
                 return;
             }
             ray = next;
@@ -181,10 +179,14 @@ impl<'a> CameraPath<'a> {
         let n = self.view.scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
         let outside = n.dot(direction) < 0.0;
         if !outside {
-            self.tally.walk.walks += 1;
-            self.tally.walk.losses.add(body.object, body.leak);
+            self.lose(body.object, body.leak);
         }
         outside
+    }
+
+    fn lose(&mut self, object: u32, cause: Cause) {
+        self.tally.walk.walks += 1;
+        self.tally.walk.losses.add(object, cause);
     }
 
     /// Whether light arrives.
@@ -202,7 +204,9 @@ impl<'a> CameraPath<'a> {
         if self.other <= 0.0 {
             return None;
         }
+        let before = self.spectrum.value_outside().max();
         self.spectrum.scale(albedo);
+        let left = self.spectrum.value_outside().max();
         let lights = &self.method.light.lights;
         if lights.has_emitters() {
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
@@ -223,7 +227,7 @@ impl<'a> CameraPath<'a> {
                 self.add(self.spectrum.value_outside() * light);
             }
         }
-        if albedo.is_black() || !survives(albedo.max(), &mut self.spectrum, &mut self.draws) {
+        if left <= 0.0 || !survives(left / before, &mut self.spectrum, &mut self.draws) {
             return None;
         }
         let w = cosine_hemisphere(at.n, self.draws.pair());
@@ -265,10 +269,9 @@ impl Watch for Gather<'_, '_> {
         if path.method.options.orders.none_above(path.order) {
             return false;
         }
-        let (source, cells) = (&path.method.sources[body.object as usize], path.photons.get(body.object as usize));
-        let photons = source.as_ref().zip(cells.and_then(Option::as_ref));
-        if let (Some((source, _)), Some(edge), true) = (photons, edge, path.direct > 0.0) {
-            let share = walked_share(source.yielding, source.reach, edge.length, edge.phase);
+        let photons = path.photons.get(body.object as usize).and_then(Option::as_ref);
+        if let (Some(cells), Some(edge), true) = (photons, edge, path.direct > 0.0) {
+            let share = walked_share(cells, edge.length, edge.phase);
             if share < 1.0 && draws.number() >= share {
                 path.direct = 0.0;
                 // What has been weighted up before goes on for certain: no weight is above the inverse of the chance.
@@ -297,9 +300,9 @@ impl Watch for Gather<'_, '_> {
                 return false;
             }
         }
-        if let (Some((source, cells)), true) = (photons, orders.contains(path.order + 1)) {
+        if let (Some(cells), true) = (photons, orders.contains(path.order + 1)) {
             let (coins, tally) = (&mut path.coins, &mut path.tally.walk);
-            let light = connect(path.view, body, (cells, source.yielding), (x, w), path.scratch, coins, tally);
+            let light = connect(path.view, body, cells, (x, w), path.scratch, coins, tally);
             // Radiance falls by η² on its way out.
             path.radiance += spectrum.value(&body.medium) * light * (path.direct / (body.eta * body.eta));
         }
@@ -344,7 +347,7 @@ pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, dire
     let (spectrum, draws) = (path.spectrum, path.draws.clone());
     if path.method.options.specular {
         let at = path.view.point(hit, direction);
-        let n = at.normal_seen_from(-direction);
+        let n = shading_normal(body, &at, direction);
         path.spectrum.scale(Rgb::splat(reflectance(body.eta, -n.dot(direction))));
         let w = reflect(-direction, n);
         path.draws = draws.fork(1);
@@ -360,11 +363,19 @@ pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, dire
 /// From the camera into a body and through it; the ray on which the path leaves.
 pub fn enter<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) -> Option<Ray> {
     let at = path.view.point(hit, direction);
-    // As in `subsurface`: what leaves towards the viewer is shaded with the interpolated normal.
-    let n = at.normal_seen_from(-direction);
+    let n = shading_normal(body, &at, direction);
     let passed = transmittance(body.eta, -n.dot(direction));
-    let refracted = refract(-direction, n, body.eta).filter(|w| w.dot(at.n_geometric) < 0.0);
-    let w = refracted.or_else(|| refract(-direction, at.n_geometric, body.eta))?;
+    if passed <= 0.0 {
+        return None;
+    }
     path.spectrum.scale(Rgb::splat(passed));
-    if passed > 0.0 { path.inside(body, &at, w) } else { None }
+    path.inside(body, &at, refract(-direction, n, body.eta)?)
+}
+
+/// The normal of both parts. As in `subsurface` what leaves towards the viewer is shaded with the interpolated one, but not
+/// where light refracted by that, at η below 1, would not go through the triangle.
+fn shading_normal(body: &Body, at: &SurfacePoint, direction: Vec3) -> Vec3 {
+    let n = at.normal_seen_from(-direction);
+    let through = |w: Vec3| w.dot(at.n_geometric) < 0.0;
+    if refract(-direction, n, body.eta).is_none_or(through) { n } else { at.n_geometric }
 }

@@ -12,25 +12,28 @@ pub struct Cells {
     starts: Vec<u32>,
     photons: Vec<Photon>,
     reach: f32,
+    yielding: f32,
 }
 
 /// Cubes at most; beyond, they become larger than half the reach.
 const MOST_CELLS: f64 = 4e6;
 
 impl Cells {
-    /// `photons` for queries of radius `reach` [unit].
-    pub fn new(photons: Vec<Photon>, reach: f32) -> Self {
+    /// `photons` for queries of radius `reach` [unit], whose connections yield to the walk by `yielding` [unit²]: see
+    /// [`super::connect::walked_share`].
+    pub fn new(photons: Vec<Photon>, reach: f32, yielding: f32) -> Self {
         let (lo, hi) =
             photons.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p.x), hi.max(p.x)));
         if photons.is_empty() {
-            return Self { lo: DVec3::ZERO, edge: 1.0, size: [0; 3], starts: vec![0], photons, reach };
+            return Self { lo: DVec3::ZERO, edge: 1.0, size: [0; 3], starts: vec![0], photons, reach, yielding };
         }
         let side = (hi - lo).as_vec3().max(Vec3::splat(1e-6 * reach));
         let finest = (side.x as f64 * side.y as f64 * side.z as f64 / MOST_CELLS).cbrt() as f32;
         let longest = side.max_element() / 1000.0;
         let edge = (0.5 * reach).max(finest).max(longest);
         let size = (side / edge).to_array().map(|n| n as usize + 1);
-        let mut cells = Self { lo, edge, size, starts: vec![0; size.iter().product::<usize>() + 1], photons, reach };
+        let starts = vec![0; size.iter().product::<usize>() + 1];
+        let mut cells = Self { lo, edge, size, starts, photons, reach, yielding };
         let homes: Vec<u32> = cells.photons.iter().map(|p| cells.home(p.x)).collect();
         for &home in &homes {
             cells.starts[home as usize + 1] += 1;
@@ -109,6 +112,11 @@ impl Cells {
     pub fn reach(&self) -> f32 {
         self.reach
     }
+
+    /// How far a connection's share yields to the walk's [unit²].
+    pub fn yielding(&self) -> f32 {
+        self.yielding
+    }
 }
 
 #[cfg(test)]
@@ -124,7 +132,7 @@ mod tests {
         };
         let photons: Vec<Photon> =
             (0..5000).map(|i| Photon { x: at(i), w: Vec3::Z, flux: Rgb::splat(i as f32) }).collect();
-        let cells = Cells::new(photons.clone(), 0.7);
+        let cells = Cells::new(photons.clone(), 0.7, 1.0);
         let mut rows = Vec::new();
         for i in 0..200 {
             let x = at(i + 9000) * 1.2 - 0.4;
@@ -135,6 +143,6 @@ mod tests {
                 assert!(p.x.distance(x) > 0.7 || found.contains(&p.flux[0]), "{x}: {:?} is missing", p.x);
             }
         }
-        assert_eq!(Cells::new(Vec::new(), 1.0).near(DVec3::ZERO, &mut rows), 0);
+        assert_eq!(Cells::new(Vec::new(), 1.0, 1.0).near(DVec3::ZERO, &mut rows), 0);
     }
 }

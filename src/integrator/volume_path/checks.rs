@@ -9,6 +9,7 @@ use crate::math::{DVec3, GaussLegendre, Vec3};
 use crate::optics::{HenyeyGreenstein, transmittance};
 use crate::query::{self, Backend};
 use crate::scene::{Environment, SceneFile};
+use crate::tally::WalkTally;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -76,8 +77,8 @@ fn photons_carry_what_enters() {
         let (source, body) = (method.sources[0].as_ref().unwrap(), method.bodies[0].as_ref().unwrap());
         let found: Vec<f64> = (0..8)
             .map(|pass| {
-                let mut work = (RayTally::default(), WalkTally::default());
-                let cells = source.trace(view, body, &method.light.lights, pass, &mut work);
+                let mut work = Tally::default();
+                let cells = source.trace(view, body, &method.light.lights, pass, &mut work).unwrap();
                 let all = (0..cells.len() as u32).map(|i| f64::from(cells.photons((i, i + 1))[0].flux[0]));
                 all.sum::<f64>() / 1e-4
             })
@@ -116,15 +117,16 @@ fn connections_are_the_integral_over_photons() {
                 let r = reach * (i as f32 + draws.number()) / each as f32;
                 Photon { x: x + (draws.direction() * r).as_dvec3(), w: w_p, flux: Rgb::splat(r * r) }
             };
-            let cells = Cells::new((0..each).map(photon).collect(), reach);
+            let cells = Cells::new((0..each).map(photon).collect(), reach, yielding);
             let (mut scratch, mut tally) = (Scratch::default(), WalkTally::default());
-            let found = connect(view, body, (&cells, yielding), (x, w), &mut scratch, &mut draws, &mut tally);
+            let found = connect(view, body, &cells, (x, w), &mut scratch, &mut draws, &mut tally);
             let value = f64::from(found[0]) * f64::from(reach) / f64::from(each) * 4.0 * PI;
             (sum, squares) = (sum + value, squares + value * value);
         }
         let mean = sum / rounds as f64;
         let error = ((squares / rounds as f64 - mean * mean) / rounds as f64).sqrt();
         let (phase, rule) = (HenyeyGreenstein { g }, GaussLegendre::new(20));
+        let none = Cells::new(Vec::new(), reach, yielding);
         let over = |z: f64| {
             let side = (1.0 - z * z).max(0.0).sqrt();
             let at = |angle: f64| {
@@ -132,7 +134,7 @@ fn connections_are_the_integral_over_photons() {
                 let cosine_p = -(0.6 * z + 0.8 * side * angle.cos());
                 let (p_v, p_p) = (phase.value(z), phase.value(cosine_p));
                 let along = |r: f64| {
-                    let share = 1.0 - f64::from(walked_share(yielding, reach, r as f32, p_v as f32));
+                    let share = 1.0 - f64::from(walked_share(&none, r as f32, p_v as f32));
                     p_v * p_p * (-10.0 * r).exp() * share
                 };
                 rule.integrate_panels(0.0, f64::from(reach) * (1.0 - 1e-6), 4, along)

@@ -29,11 +29,11 @@ pub struct Scratch {
 /// take: flux of a photon over radiance of the lamps. Any shares that add up to 1 for each path are unbiased, as long as
 /// they depend on the path alone.
 #[inline]
-pub fn walked_share(yielding: f32, reach: f32, length: f32, phase: f32) -> f32 {
-    if length >= reach {
+pub fn walked_share(cells: &Cells, length: f32, phase: f32) -> f32 {
+    if length >= cells.reach() {
         return 1.0;
     }
-    let c = yielding * phase;
+    let c = cells.yielding() * phase;
     c / (length * length + c)
 }
 
@@ -46,7 +46,7 @@ pub fn walked_share(yielding: f32, reach: f32, length: f32, phase: f32) -> f32 {
 pub fn connect(
     view: View<'_>,
     body: &Body,
-    (cells, yielding): (&Cells, f32),
+    cells: &Cells,
     (x, w): (DVec3, Vec3),
     scratch: &mut Scratch,
     coins: &mut Draws,
@@ -59,7 +59,7 @@ pub fn connect(
     }
     let stride = near.div_ceil(MOST_LOOKED_AT);
     let mut skip = ((coins.number() * stride as f32) as u32).min(stride - 1);
-    let reach2 = cells.reach() * cells.reach();
+    let (reach2, yielding) = (cells.reach() * cells.reach(), cells.yielding());
     let sigma_t = body.medium.sigma_t;
     let (mut sum, isotropic) = (Rgb::BLACK, body.phase.g == 0.0);
     found.clear();

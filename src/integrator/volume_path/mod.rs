@@ -6,8 +6,10 @@ mod camera;
 mod cells;
 #[cfg(test)]
 mod checks;
+mod clear;
 mod connect;
 mod draws;
+mod emission;
 mod facets;
 mod pencil;
 mod photons;
@@ -23,9 +25,10 @@ use crate::math::Rgb;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
-use crate::tally::{Cause, RayTally, Tally, WalkTally};
+use crate::tally::{Cause, Tally};
 use crate::words::short;
 use body::Body;
+pub use body::MOST_SURFACES;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 use connect::Scratch;
@@ -95,7 +98,7 @@ impl VolumePath {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
             let scatters = body.medium.albedo.max() > 0.0;
-            scatters.then(|| Source::new(scene, body, &lights, options.photons, reach, options.seed)).flatten()
+            scatters.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
         };
         let sources = bodies.iter().map(source).collect();
         let diffuse = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_opaque());
@@ -105,6 +108,11 @@ impl VolumePath {
         let persistence = beside.sqrt().max(least);
         let light = DirectLight { lights, samples: 1 };
         Ok(Self { options, light, bodies, sources, persistence, camera_in: scene.camera_in(), once: false })
+    }
+
+    /// What to say of `scene` before it is rendered: light that may not be found.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        clear::warning(scene, &self.light.lights).into_iter().collect()
     }
 
     fn shade(
@@ -237,10 +245,7 @@ impl Integrator for VolumePath {
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
         let fill = |(source, body): (&Option<Source>, &Option<Body>)| {
             let (source, body) = (source.as_ref()?, body.as_ref()?);
-            let mut work = (RayTally::default(), WalkTally::default());
-            let cells = source.trace(view, body, &self.light.lights, pass, &mut work);
-            tally.rays += work.0;
-            tally.walk += work.1;
+            let cells = source.trace(view, body, &self.light.lights, pass, tally)?;
             tally.walk.photons += u64::from(source.count);
             Some(cells)
         };

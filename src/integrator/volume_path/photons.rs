@@ -3,17 +3,19 @@
 use super::body::{Body, Edge, Watch};
 use super::cells::Cells;
 use super::draws::Draws;
+use super::emission::{Emission, Entering};
 use super::spectrum::Spectrum;
-use crate::geometry::{AreaTable, SurfacePoint};
+use crate::geometry::AreaTable;
 use crate::integrator::View;
-use crate::light::{Arrival, Lights};
+use crate::light::Lights;
 use crate::math::{DVec3, Rgb, Vec3, hash_combine};
-use crate::optics::{refract, transmittance};
+use crate::optics::refract;
 use crate::sampling::{CacheStream, Points, Turn};
 use crate::scene::Scene;
-use crate::tally::{RayTally, WalkTally};
+use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::sync::OnceLock;
 
 /// Light scattered at a point.
 #[derive(Clone, Copy, Debug)]
@@ -38,10 +40,15 @@ pub struct Source {
     pub count: u32,
     /// Connections reach this far [unit].
     pub reach: f32,
-    /// How far a connection's share yields to the walk's: see [`super::connect`].
-    pub yielding: f32,
-    /// Share of the photons that come from suns.
-    pub from_suns: f32,
+    /// What a first look at the lights tells, once; `None` where no light comes to the body.
+    plan: OnceLock<Option<Plan>>,
+}
+
+/// How photons start, and how far their connections yield to the walk: see [`super::connect`].
+#[derive(Clone, Copy, Debug)]
+struct Plan {
+    emission: Emission,
+    yielding: f32,
 }
 
 /// Photons that tell how many collisions a photon leaves.
@@ -50,79 +57,97 @@ const SOUNDING: u64 = 512;
 const BYTES_PER_PHOTON: f64 = 3.7 * size_of::<Photon>() as f64;
 /// Photons traced by one task.
 const CHUNK: u64 = 64;
-/// Photons of the estimate that sets [`Source::yielding`].
+/// Photons of the estimate that makes a [`Plan`].
 const PILOT: u64 = 1024;
+/// Each of the [`Emission::ways`] has at least this share before they are made to add up to 1: what bounds a photon's power.
+const LEAST_WAY: f32 = 0.02;
 /// Beside lamps, suns have at least this share of the photons, and at most all but this.
 const LEAST_SHARE: f32 = 0.05;
 
 impl Source {
-    /// `None` where no lamp shines on the object. `count` photons a pass; `reach` [unit].
-    pub fn new(scene: &Scene, body: &Body, lights: &Lights, count: u32, reach: f32, seed: u64) -> Option<Self> {
+    /// `None` for a body without area. `count` photons a pass; `reach` [unit].
+    pub fn new(scene: &Scene, body: &Body, count: u32, reach: f32, seed: u64) -> Option<Self> {
         let table = AreaTable::new(&scene.objects[body.object as usize].mesh)?;
         let seed = hash_combine(hash_combine(seed, 0x7068_6f74_6f6e), u64::from(body.object));
         let streams = Turn::seeds(seed).map(|seed| CacheStream::new(Points::Sobol, seed, 0));
-        let mut source = Self { table, streams, seed, count, reach, yielding: 0.0, from_suns: 0.0 };
-        // Light that would arrive without anything in its way; by numbers that no photon uses, for shares of connections
-        // that depended on the photons would not be fair.
-        let pilot = CacheStream::new(Points::Sobol, seed, 1);
-        let mut flux_if = |from_suns: f32| {
-            source.from_suns = from_suns;
-            let arrivals = (0..PILOT).filter_map(|i| source.arrival(scene, body, lights, pilot.numbers(i)));
-            arrivals.map(|(_, _, flux)| flux.mean()).sum::<f32>() / PILOT as f32
+        Some(Self { table, streams, seed, count, reach, plan: OnceLock::new() })
+    }
+
+    fn plan(&self, view: View<'_>, body: &Body, lights: &Lights) -> Option<&Plan> {
+        self.plan.get_or_init(|| self.look(view, body, lights)).as_ref()
+    }
+
+    /// By numbers that no photon uses, for shares of connections that depended on the photons would not be fair. Points are
+    /// taken to see each other.
+    fn look(&self, view: View<'_>, body: &Body, lights: &Lights) -> Option<Plan> {
+        let pilot = CacheStream::new(Points::Sobol, self.seed, 1);
+        let flux_by = |emission: Emission| {
+            let (mut flux, mut by) = (0.0, [0.0; 3]);
+            for i in 0..PILOT {
+                let (pick, u) = pilot.numbers(i);
+                let found = emission.sample(view, (body, &self.table), lights, (pick, &u), &mut Tally::default());
+                let Some(entering) = found else { continue };
+                let each = entering.flux.mean() / PILOT as f32;
+                flux += each;
+                by.iter_mut().zip(entering.by).for_each(|(sum, share)| *sum += each * share);
+            }
+            (flux, by)
         };
-        let flux = [
-            if lights.has_emitters() { flux_if(0.0) } else { 0.0 },
-            if lights.has_suns() { flux_if(1.0) } else { 0.0 },
-        ];
-        source.from_suns = match (lights.has_emitters(), lights.has_suns()) {
+        let (from_lamps, by) = if lights.has_emitters() {
+            flux_by(Emission { from_suns: 0.0, ways: [1.0 / 3.0; 3] })
+        } else {
+            (0.0, [1.0; 3])
+        };
+        let from_suns =
+            if lights.has_suns() { flux_by(Emission { from_suns: 1.0, ways: [1.0 / 3.0; 3] }).0 } else { 0.0 };
+        // Each way by the part of the flux that is its own under equal shares.
+        let least = by.map(|flux| (flux / from_lamps.max(f32::MIN_POSITIVE)).max(LEAST_WAY));
+        let ways = least.map(|share| share / least.iter().sum::<f32>());
+        let sunny = match (lights.has_emitters(), lights.has_suns()) {
             (_, false) => 0.0,
             (false, true) => 1.0,
             (true, true) => {
-                (flux[1] / (flux[0] + flux[1]).max(f32::MIN_POSITIVE)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE)
+                (from_suns / (from_lamps + from_suns).max(f32::MIN_POSITIVE)).clamp(LEAST_SHARE, 1.0 - LEAST_SHARE)
             }
         };
         // Radiance that brings the flux: of two kinds of light the mean of what each alone would have.
-        let per = |flux: f32, radiance: f32| if flux > 0.0 { flux / (radiance * count as f32) } else { 0.0 };
-        let per_photon = per(flux[0], lights.mean_radiance()) + per(flux[1], lights.radiance_of_suns());
-        source.yielding = YIELD * per_photon / (4.0 * PI * body.eta * body.eta);
-        (source.yielding.is_normal()).then_some(source)
+        let per = |flux: f32, radiance: f32| if flux > 0.0 { flux / (radiance * self.count as f32) } else { 0.0 };
+        let per_photon = per(from_lamps, lights.mean_radiance()) + per(from_suns, lights.radiance_of_suns());
+        let yielding = YIELD * per_photon / (4.0 * PI * body.eta * body.eta);
+        let emission = Emission { from_suns: sunny, ways };
+        (yielding.is_normal()).then_some(Plan { emission, yielding })
     }
 
-    /// The pass's photons, in cells. Which thread traces which photon does not matter: each is a function of its number.
-    pub fn trace(
-        &self,
-        view: View<'_>,
-        body: &Body,
-        lights: &Lights,
-        pass: u32,
-        tally: &mut (RayTally, WalkTally),
-    ) -> Cells {
+    /// The pass's photons, in cells; `None` where no light comes to the body. Which thread traces which photon does not matter: each is a function of its number.
+    pub fn trace(&self, view: View<'_>, body: &Body, lights: &Lights, pass: u32, tally: &mut Tally) -> Option<Cells> {
+        let plan = self.plan(view, body, lights)?;
         let turn = Turn::of(self.seed, pass);
         let first = u64::from(turn.number) * u64::from(self.count);
-        let chunks: Vec<(Vec<Photon>, RayTally, WalkTally)> = (0..u64::from(self.count).div_ceil(CHUNK))
+        let chunks: Vec<(Vec<Photon>, Tally)> = (0..u64::from(self.count).div_ceil(CHUNK))
             .into_par_iter()
             .map(|chunk| {
                 let numbers = chunk * CHUNK..((chunk + 1) * CHUNK).min(u64::from(self.count));
-                let (mut photons, mut rays, mut walks) = (Vec::new(), RayTally::default(), WalkTally::default());
+                let (mut photons, mut tally) = (Vec::new(), Tally::default());
                 for number in numbers {
-                    self.photon(view, body, lights, (turn, first + number), &mut photons, (&mut rays, &mut walks));
+                    let which = (plan, turn, first + number);
+                    self.photon(view, body, lights, which, &mut photons, &mut tally);
                 }
-                (photons, rays, walks)
+                (photons, tally)
             })
             .collect();
         let mut photons = Vec::with_capacity(chunks.iter().map(|(p, ..)| p.len()).sum());
-        for (some, rays, walks) in chunks {
+        for (some, work) in chunks {
             photons.extend(some);
-            tally.0 += rays;
-            tally.1 += walks;
+            *tally += work;
         }
-        tally.1.vertices += photons.len() as u64;
-        Cells::new(photons, self.reach)
+        tally.walk.vertices += photons.len() as u64;
+        Some(Cells::new(photons, self.reach, plan.yielding))
     }
 
     /// Memory of a pass's photons at its most, while they are sorted [bytes], by a few of the first pass.
     pub fn bytes(&self, view: View<'_>, body: &Body, lights: &Lights) -> u64 {
         let few = u64::from(self.count).min(SOUNDING);
+        let Some(plan) = self.plan(view, body, lights) else { return 0 };
         if few == 0 {
             return 0;
         }
@@ -131,35 +156,12 @@ impl Source {
         let kept: usize = (0..few)
             .into_par_iter()
             .map(|i| {
-                let (mut photons, mut rays, mut walks) = (Vec::new(), RayTally::default(), WalkTally::default());
-                self.photon(view, body, lights, (turn, i), &mut photons, (&mut rays, &mut walks));
+                let (mut photons, mut tally) = (Vec::new(), Tally::default());
+                self.photon(view, body, lights, (plan, turn, i), &mut photons, &mut tally);
                 photons.len()
             })
             .sum();
         (kept as f64 / few as f64 * f64::from(self.count) * BYTES_PER_PHOTON) as u64
-    }
-
-    /// A point of the surface, the light that arrives there if nothing is in its way, and what enters of it.
-    fn arrival(
-        &self,
-        scene: &Scene,
-        body: &Body,
-        lights: &Lights,
-        (pick, u): (f64, [f32; 7]),
-    ) -> Option<(SurfacePoint, Arrival, Rgb)> {
-        let at = self.table.sample(pick, [u[0], u[1]]);
-        let mut point = scene.objects[body.object as usize].mesh.point(at.triangle, at.u, at.v);
-        point.n = point.n_geometric;
-        // The number that picks suns or lamps, spread out again, picks one of them.
-        let (arrival, share) = if u[2] < self.from_suns {
-            let pick = u[2] / self.from_suns;
-            (lights.sample_sun(&point, [pick, u[3], u[4]])?, self.from_suns)
-        } else {
-            let pick = (u[2] - self.from_suns) / (1.0 - self.from_suns);
-            (lights.sample_emitter(scene, &point, [pick, u[3], u[4]])?, 1.0 - self.from_suns)
-        };
-        let entering = transmittance(body.eta, arrival.w.dot(point.n)) * self.table.area() as f32 / share;
-        Some((point, arrival, arrival.irradiance * entering))
     }
 
     fn photon(
@@ -167,20 +169,23 @@ impl Source {
         view: View<'_>,
         body: &Body,
         lights: &Lights,
-        (turn, number): (Turn, u64),
+        (plan, turn, number): (&Plan, Turn, u64),
         photons: &mut Vec<Photon>,
-        (rays, walks): (&mut RayTally, &mut WalkTally),
+        tally: &mut Tally,
     ) {
         let numbers = self.streams[turn.stream].numbers(number);
-        let Some((at, arrival, flux)) = self.arrival(view.scene, body, lights, numbers) else { return };
-        let Some(w) = refract(arrival.w, at.n, body.eta) else { return };
+        let found = plan.emission.sample(view, (body, &self.table), lights, (numbers.0, &numbers.1), tally);
+        let Some(Entering { at, w, flux, light, shadow, .. }) = found else { return };
+        let Some(w) = refract(w, at.n, body.eta) else { return };
         if flux.is_black() {
             return;
         }
-        rays.shadow += 1;
-        let open = !view.rays.occluded(&arrival.shadow);
-        if let Some(light) = arrival.light {
-            rays.lights.ask(light, open);
+        let open = shadow.is_none_or(|shadow| {
+            tally.rays.shadow += 1;
+            !view.rays.occluded(&shadow)
+        });
+        if let Some(light) = light {
+            tally.rays.lights.ask(light, open);
         }
         if !open {
             return;
@@ -190,7 +195,7 @@ impl Source {
         let coins = draws.fork(0);
         let mut spectrum = Spectrum::new(flux * (1.0 / self.count as f32), draws.number());
         let mut deposit = Deposit { body, photons, reach: self.reach, coins };
-        body.walk(view, (at.leave(w), w), &mut spectrum, &mut draws, &mut deposit, walks);
+        body.walk(view, (at.leave(w), w), &mut spectrum, &mut draws, &mut deposit, &mut tally.walk);
     }
 }
 
@@ -215,5 +220,5 @@ impl Watch for Deposit<'_> {
 
 /// The smallest chance of being kept.
 const LEAST_CHANCE: f32 = 0.02;
-/// Scales [`Source::yielding`]; found by measuring the error at equal time.
+/// Scales [`Plan::yielding`]; found by measuring the error at equal time.
 const YIELD: f32 = 256.0;

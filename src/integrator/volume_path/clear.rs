@@ -1,0 +1,76 @@
+//! Light that comes to a surface only through a clear body: no shadow ray passes a boundary, so paths meet it by chance.
+
+use crate::light::Lights;
+use crate::math::DVec3;
+use crate::optics::Medium;
+use crate::scene::{Object, Scene, Surface};
+use std::f64::consts::PI;
+
+/// A body is clear where more than exp(-3) = 5 % of the light in some channel goes straight through its thickness.
+const CLEAR: f64 = 3.0;
+/// A light is small where fewer than this share of the paths that leave a surface by the cosine meet it.
+const SMALL: f64 = 0.01;
+/// A picture's suns matter from this share of its light.
+const SUNNY: f32 = 0.01;
+
+/// What is to say of a scene before it is rendered; `None` where there is no such light.
+pub fn warning(scene: &Scene, lights: &Lights) -> Option<String> {
+    let mut kept = [Vec::new(), Vec::new()];
+    let mut keep = |list: usize, name: &str| {
+        let name = format!("{name:?}");
+        if !kept[list].contains(&name) {
+            kept[list].push(name);
+        }
+    };
+    let sun = lights.has_suns()
+        && f64::from(lights.solid_angle_of_suns()) < SMALL * PI
+        && lights.share_beside_suns() < 1.0 - SUNNY;
+    for (i, body) in scene.objects.iter().enumerate() {
+        let Some(t) = &scene.materials[body.material].surface.inside else { continue };
+        if !is_clear(&t.medium, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
+            continue;
+        }
+        if sun {
+            keep(0, "the bright part of the environment's picture");
+            keep(1, &body.name);
+        }
+        for lamp in scene.objects.iter().filter(|lamp| is_small(scene, lamp, body)) {
+            keep(0, &lamp.name);
+            keep(1, &body.name);
+        }
+    }
+    let [from, through] = kept.map(|names| names.join(", "));
+    (!from.is_empty()).then(|| {
+        format!(
+            "light of {from} that comes through {through} to diffuse surfaces or other bodies is met by chance alone, so seldom that \
+             it may be missing from the picture and from the error that is told: no shadow ray passes through a body; take larger \
+             or softer lights, many more samples, or leave the clear body out"
+        )
+    })
+}
+
+/// Whether light goes straight through it in some channel.
+fn is_clear(medium: &Medium, body: &Object) -> bool {
+    let sigma_t = medium.sigma_t();
+    let least = f64::from(sigma_t.0.into_iter().fold(f32::INFINITY, f32::min));
+    body.thickness().is_some_and(|thickness| least * thickness < CLEAR)
+}
+
+/// Whether it shows light that comes to it.
+fn receives(scene: &Scene, object: &Object) -> bool {
+    match &scene.materials[object.material].surface {
+        Surface { inside: Some(t), .. } => !t.medium.sigma_s.is_black(),
+        Surface { bsdf, .. } => !bsdf.albedo().is_black(),
+    }
+}
+
+/// Whether an object is a lamp that is seldom met from where `body` is.
+fn is_small(scene: &Scene, lamp: &Object, body: &Object) -> bool {
+    if !scene.materials[lamp.material].surface.shines() {
+        return false;
+    }
+    let middle = |o: &Object| o.mesh.bounds().map(|(lo, hi): (DVec3, DVec3)| 0.5 * (lo + hi));
+    let (Some(a), Some(b)) = (middle(lamp), middle(body)) else { return false };
+    let area: f64 = (0..lamp.mesh.triangles.len() as u32).map(|t| lamp.mesh.area(t)).sum();
+    area > 0.0 && area < SMALL * PI * a.distance_squared(b)
+}

@@ -1,0 +1,117 @@
+//! Where light of lamps and suns enters a body, and how much of it.
+
+use super::body::Body;
+use crate::geometry::{AreaTable, SurfacePoint};
+use crate::integrator::View;
+use crate::light::{Lights, emitted};
+use crate::math::{Rgb, Vec3};
+use crate::optics::transmittance;
+use crate::query::Ray;
+use crate::sampling::cosine_hemisphere;
+use crate::tally::Tally;
+use std::f32::consts::PI;
+
+/// Light at a point of a body's surface.
+pub struct Entering {
+    /// The point, flat as its triangle.
+    pub at: SurfacePoint,
+    /// Unit direction towards the light.
+    pub w: Vec3,
+    /// Flux that enters, over the density of point and direction [radiance unit x sr x unit²].
+    pub flux: Rgb,
+    /// The number of the light, where it is one that is counted.
+    pub light: Option<usize>,
+    /// It arrives if nothing is hit on this ray; `None` where that is known.
+    pub shadow: Option<Ray>,
+    /// Share of each of the [`Emission::ways`] in its density; zeros under a sun.
+    pub by: [f32; 3],
+}
+
+/// How pairs of a point of the body and a point of a light are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Emission {
+    /// Share of the pairs whose light is a sun.
+    pub from_suns: f32,
+    /// Shares of the three ways to draw a point of a lamp and one of the body: both by area; the body's by area, and the lamp
+    /// by a direction with the cosine about the normal there; the lamp's by area, and the body by the cosine about the normal
+    /// of the lamp. Together by the balance heuristic [VG95]. The first alone has no bound where a lamp is near; by the others a
+    /// pair carries no more than π times radiance times the area of the body, or of the lamp, over their share.
+    pub ways: [f32; 3],
+}
+
+impl Emission {
+    /// One pair, before it is known whether anything stands between; `None` where no light comes that way.
+    pub fn sample(
+        &self,
+        view: View<'_>,
+        (body, table): (&Body, &AreaTable),
+        lights: &Lights,
+        (pick, u): (f64, &[f32; 7]),
+        tally: &mut Tally,
+    ) -> Option<Entering> {
+        let mesh = &view.scene.objects[body.object as usize].mesh;
+        let flat = |triangle, u, v| {
+            let at = mesh.point(triangle, u, v);
+            SurfacePoint { n: at.n_geometric, ..at }
+        };
+        let on_body = || {
+            let at = table.sample(pick, [u[0], u[1]]);
+            flat(at.triangle, at.u, at.v)
+        };
+        let area = table.area() as f32;
+        let passed = |at: &SurfacePoint, w: Vec3| transmittance(body.eta, w.dot(at.n)) * area;
+        // The number that picks suns or lamps, spread out again, picks one of them.
+        if u[2] < self.from_suns {
+            let at = on_body();
+            let sun = lights.sample_sun(&at, [u[2] / self.from_suns, u[3], u[4]])?;
+            let flux = sun.irradiance * (passed(&at, sun.w) / self.from_suns);
+            return Some(Entering { at, w: sun.w, flux, light: sun.light, shadow: Some(sun.shadow), by: [0.0; 3] });
+        }
+        let lamps = 1.0 - self.from_suns;
+        let pick_way = (u[2] - self.from_suns) / lamps;
+        // Densities of the three ways over that of the second, without their shares.
+        let together = |at: &SurfacePoint, w: Vec3, (pdf_angle, pdf_area, two_sided): (f32, f32, bool)| {
+            let ways = [PI * pdf_angle / at.n.dot(w), 1.0, area * pdf_area * if two_sided { 0.5 } else { 1.0 }];
+            let by: [f32; 3] = std::array::from_fn(|i| self.ways[i] * ways[i]);
+            let density = by.iter().sum::<f32>();
+            (by.map(|d| d / density), PI / density / lamps)
+        };
+        let two_sided = |object: u32| view.scene.surface(object).emission.is_some_and(|e| e.two_sided);
+        if pick_way < self.ways[0] {
+            let at = on_body();
+            let lamp = lights.point(view.scene, [pick_way / self.ways[0], u[3], u[4]])?;
+            let arrival = Lights::from_point(&lamp, &at)?;
+            let (by, weight) = together(&at, arrival.w, (arrival.pdf_angle, lamp.pdf_area, lamp.two_sided));
+            let flux = lamp.radiance * (weight * passed(&at, arrival.w));
+            Some(Entering { at, w: arrival.w, flux, light: arrival.light, shadow: Some(arrival.shadow), by })
+        } else if pick_way < self.ways[0] + self.ways[1] {
+            let at = on_body();
+            let (w, ray) = Lights::look_up(&at, [u[3], u[4]])?;
+            tally.rays.bounce += 1;
+            let hit = view.rays.closest(&ray)?;
+            let radiance = emitted(view.scene, &hit, w);
+            if radiance.is_black() {
+                return None;
+            }
+            let pdf_angle = lights.pdf_angle(view.scene, &hit, w);
+            let (by, weight) = together(&at, w, (pdf_angle, lights.pdf_area(hit.mesh), two_sided(hit.mesh)));
+            let flux = radiance * (weight * passed(&at, w));
+            Some(Entering { at, w, flux, light: lights.number(hit.mesh), shadow: None, by })
+        } else {
+            let lamp = lights.point(view.scene, [pick as f32, u[0], u[1]])?;
+            let side = (pick_way - self.ways[0] - self.ways[1]) / self.ways[2];
+            let n = if lamp.two_sided && side >= 0.5 { -lamp.at.n_geometric } else { lamp.at.n_geometric };
+            let out = cosine_hemisphere(n, [u[3], u[4]]);
+            tally.rays.bounce += 1;
+            let hit = view.rays.closest(&Ray::new(lamp.at.leave(out), out)).filter(|hit| hit.mesh == body.object)?;
+            let (at, w) = (flat(hit.triangle, hit.u, hit.v), -out);
+            if at.n.dot(w) <= 0.0 {
+                return None;
+            }
+            let pdf_angle = hit.t * lamp.pdf_area * hit.t / n.dot(out);
+            let (by, weight) = together(&at, w, (pdf_angle, lamp.pdf_area, lamp.two_sided));
+            let flux = lamp.radiance * (weight * passed(&at, w));
+            Some(Entering { at, w, flux, light: Some(lamp.light), shadow: None, by })
+        }
+    }
+}
