@@ -3,11 +3,12 @@
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
 use marmor::film::{Film, Image, Window};
-use marmor::integrator::{Cause, MOST_SURFACES, Tally, View, VolumePath, VolumePathOptions};
+use marmor::integrator::{MOST_SURFACES, View, VolumePath, VolumePathOptions};
 use marmor::math::hash;
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::scene::{Orders, Scene, SceneFile};
+use marmor::tally::{Cause, Tally};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
