@@ -210,7 +210,7 @@ fn a_closed_white_room_ends_and_is_counted() {
     let found: Vec<_> = tally.walk.losses.each().collect();
     assert!(found.len() == 1 && found[0].cause == Cause::Endless && found[0].object == 0 && found[0].paths == 64);
     assert!(tally.walk.lost_many());
-    let said = tally.walk.lost(&scene).join("\n");
+    let said = marmor::integrator::lost(&tally.walk, &scene).join("\n");
     assert!(said.contains("\"room\"") && said.contains(&format!("{MOST_SURFACES} surfaces in a row")), "{said}");
 }
 
