@@ -5,7 +5,7 @@ use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::depth::DepthLaw;
 use super::exponential::{exp, exp_m1};
 use super::gather::{EntryColumns, Layout, Row};
-use super::{Bssrdf, Claims, Entry, Exit, ModelKind, ModelName};
+use super::{Bssrdf, Claims, Entry, Exit, KappaExtinction, ModelKind, ModelName};
 use crate::math::{DVec3, GaussLegendre, Level, Rgb, dispatch_at};
 use crate::optics::Medium;
 use std::f64::consts::{LOG2_E, PI};
@@ -26,17 +26,6 @@ pub(super) static MODEL: ModelKind = ModelKind {
         Ok(Box::new(PhotonBeamDiffusion::new(medium, options.exit_normalisation, options.kappa)))
     })
 };
-
-/// Extinction in the near-field correction κ = 1 - exp(-2 σ (d_r + t)). Published code differs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum KappaExtinction {
-    /// σ_t′. Nearer to the truth in the near field.
-    #[default]
-    Reduced,
-    /// σ_t, not reduced. For g > 0 nearer to the truth in the total: 1 to 3 % off at g = 0.8 and albedos from 0.9
-    /// to 0.999, where the reduced one is 5 to 14 % low. The same for g = 0.
-    Full,
-}
 
 /// Photon beam diffusion \[HCJ13\]: first scattering is spread along the refracted ray, and each point of it diffuses
 /// as a dipole with Grosjean's diffusion coefficient \[dEo12\].

@@ -1,8 +1,6 @@
 //! Vectorised sums of photon beam diffusion over many cached entries, one depth each.
 
 use super::Exit;
-#[cfg(doc)]
-use super::beam::PhotonBeamDiffusion;
 use super::gather::{BLOCK, EntryColumns, LANES, Layout, add, block};
 use super::radial::in_mean_free_paths;
 use crate::math::{Kernel, Vec3, exp2_m1, times_exp2};
@@ -53,7 +51,7 @@ impl SourceKernel {
 /// Columns beside point and weights: depth below the surface, -t w·n_i ≥ 0, and t [unit].
 pub(super) const LAYOUT: Layout = Layout { vectors: 0, numbers: 2 };
 
-/// Entries as sources: the point is x_i + t w, at the depth t that [`PhotonBeamDiffusion::sample_depth`] gave it, and the
+/// Entries as sources: the point is x_i + t w, at the depth t that [`super::PhotonBeamDiffusion::sample_depth`] gave it, and the
 /// weight has the factor [`super::DepthLaw::weights`] of t. The part of S_d is by [`super::Partition::share_source`].
 pub(super) struct Sum<'a> {
     pub channels: [SourceKernel; 3],

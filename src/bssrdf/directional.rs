@@ -1,10 +1,9 @@
 //! The directional dipole.
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
-use super::directional_gather::Sum;
 use super::exponential::{exp, exp_m1};
-use super::{Bssrdf, Claims, Entry, EntryColumns, Exit, ModelKind, ModelName};
-use crate::math::{DVec3, GaussLegendre, Level, Rgb, dispatch_at};
+use super::{Entry, Exit, ModelKind};
+use crate::math::{DVec3, GaussLegendre, Rgb};
 use crate::optics::{HalfSpace, Medium};
 use std::f64::consts::PI;
 
@@ -38,18 +37,18 @@ pub(super) static MODEL: ModelKind = ModelKind {
 ///   its total does not tend to 0 with α′ but to 0.14 at η = 1.3, while the truth does. Without any scattering it
 ///   is 0. A line can appear where n_o·w changes sign, because d_r jumps there.
 /// * Sign: the image outweighs the source at some exits. Rendering takes 0 there, as published;
-///   [`Bssrdf::eval_signed`] is the difference itself.
+///   [`super::Bssrdf::eval_signed`] is the difference itself.
 /// * Always has the exit factor 1/(4 C_phi(1/η)), as published.
 ///
 /// Computed in f64 from f32 inputs, in units of the transport mean free path, in a form without cancellation: real
 /// and virtual source are subtracted before the common exponential. The dot products, which the channels share, need
 /// f64 where x is nearly parallel to n_i; the rest has it so that no power of a length leaves the range.
 pub struct DirectionalDipole {
-    channels: [DirectionalChannel; 3],
-    totals: [f64; 3],
+    pub(super) channels: [DirectionalChannel; 3],
+    pub(super) totals: [f64; 3],
     extinction: Rgb,
-    grey: bool,
-    decay: f32,
+    pub(super) grey: bool,
+    pub(super) decay: f32,
 }
 
 /// One channel of the [`DirectionalDipole`], in f64 and not clamped: what tables are compared with.
@@ -274,7 +273,7 @@ impl DirectionalDipole {
         Self { channels, totals, extinction, grey, decay: decay as f32 }
     }
 
-    fn each_channel(&self, entry: &Entry, exit: &Exit, rate: f32, finish: impl Fn(f64) -> f64) -> Rgb {
+    pub(super) fn each_channel(&self, entry: &Entry, exit: &Exit, rate: f32, finish: impl Fn(f64) -> f64) -> Rgb {
         let x = exit.x.as_dvec3() - entry.x.as_dvec3();
         let pair = Pair::new(x, entry.n.as_dvec3(), entry.w.as_dvec3(), exit.n.as_dvec3());
         let gain = f64::from(rate) * pair.r;
@@ -287,48 +286,8 @@ impl DirectionalDipole {
 
     /// Delta-Eddington extinction σ_s (1 - g²) + σ_a [1/unit] of the reduced-intensity part S_dE of \[FHK14\]: the
     /// light that is refracted in, attenuated by exp(-extinction · length) along a straight path, and refracted
-    /// out. It is a specular path of the renderer, multiplied by that factor, and no part of [`Bssrdf::eval`].
+    /// out. It is a specular path of the renderer, multiplied by that factor, and no part of [`super::Bssrdf::eval`].
     pub fn reduced_intensity_extinction(&self) -> Rgb {
         self.extinction
-    }
-}
-
-impl Bssrdf for DirectionalDipole {
-    fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
-        self.each_channel(entry, exit, rate, clamped)
-    }
-
-    fn decay(&self) -> f32 {
-        self.decay
-    }
-
-    fn clamps(&self) -> bool {
-        true
-    }
-
-    fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
-        self.each_channel(entry, exit, 0.0, |value| value)
-    }
-
-    fn name(&self) -> ModelName {
-        ModelName::DIRECTIONAL
-    }
-
-    /// Of S_d by directions, about.
-    fn variation(&self) -> f32 {
-        0.3
-    }
-
-    fn gather_at(&self, level: Level, exits: &[Exit], entries: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
-        dispatch_at(level, Sum { channels: &self.channels, grey: self.grey, exits, entries, sums })
-    }
-
-    fn claims(&self) -> Claims {
-        Claims { first_order: true, reciprocal: false, bounded_energy: false }
-    }
-
-    /// Total over a plane at normal incidence; above 1 for weak absorption unless calibrated.
-    fn total(&self) -> Rgb {
-        Rgb::from_fn(|c| self.totals[c] as f32)
     }
 }

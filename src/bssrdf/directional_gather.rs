@@ -1,9 +1,9 @@
-//! Vectorised sums of the directional dipole over many cached entries.
+//! The directional dipole as a model: its contract, and vectorised sums over many cached entries.
 
-use super::Exit;
-use super::directional::{DirectionalChannel, Pair, clamped};
+use super::directional::{DirectionalChannel, DirectionalDipole, Pair, clamped};
 use super::gather::{EntryColumns, LANES, block};
-use crate::math::{DVec3, Kernel};
+use super::{Bssrdf, Claims, Entry, Exit, ModelName};
+use crate::math::{DVec3, Kernel, Level, Rgb, dispatch_at};
 
 /// Entries handled between two visits to memory.
 const BLOCK: usize = LANES;
@@ -80,11 +80,51 @@ fn sum_at(channels: &[DirectionalChannel; 3], grey: bool, exit: &Exit, e: &Entry
     (lanes.map(|l| l.iter().sum()), below_zero.iter().sum())
 }
 
+impl Bssrdf for DirectionalDipole {
+    fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
+        self.each_channel(entry, exit, rate, clamped)
+    }
+
+    fn decay(&self) -> f32 {
+        self.decay
+    }
+
+    fn clamps(&self) -> bool {
+        true
+    }
+
+    fn eval_signed(&self, entry: &Entry, exit: &Exit) -> Rgb {
+        self.each_channel(entry, exit, 0.0, |value| value)
+    }
+
+    fn name(&self) -> ModelName {
+        ModelName::DIRECTIONAL
+    }
+
+    /// Of S_d by directions, about.
+    fn variation(&self) -> f32 {
+        0.3
+    }
+
+    fn gather_at(&self, level: Level, exits: &[Exit], entries: &EntryColumns<'_>, sums: &mut [[f64; 3]]) -> u64 {
+        dispatch_at(level, Sum { channels: &self.channels, grey: self.grey, exits, entries, sums })
+    }
+
+    fn claims(&self) -> Claims {
+        Claims { first_order: true, reciprocal: false, bounded_energy: false }
+    }
+
+    /// Total over a plane at normal incidence; above 1 for weak absorption unless calibrated.
+    fn total(&self) -> Rgb {
+        Rgb::from_fn(|c| self.totals[c] as f32)
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Bssrdf, DirectionalDipole, Entry, Partition};
+    use super::super::Partition;
     use super::*;
-    use crate::math::{Level, Rgb, Vec3, hash, unit_f32};
+    use crate::math::{Vec3, hash, unit_f32};
     use crate::optics::Medium;
 
     #[test]

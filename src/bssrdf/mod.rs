@@ -28,7 +28,7 @@ model::registry! {
 
 use crate::math::{Level, Rgb, Vec3};
 pub use auto::{Choice, choose};
-pub use beam::{BeamChannel, KappaExtinction, PhotonBeamDiffusion};
+pub use beam::{BeamChannel, PhotonBeamDiffusion};
 pub use better::BetterDipole;
 pub use channel::ChannelMedium;
 pub use depth::DepthLaw;
@@ -38,7 +38,7 @@ pub use expected::{ExpectedError, Place, Unmeasured, expected_error, measured_al
 pub use gather::{EntryColumns, LEAST_COLUMNS, Layout, MOST_COLUMNS, Row};
 #[doc(hidden)]
 pub use model::all_models;
-pub use model::{ModelKind, ModelName, ModelOptions};
+pub use model::{KappaExtinction, ModelKind, ModelName, ModelOptions};
 pub use normalised::{NormalisedDiffusion, WidthFit};
 #[doc(hidden)]
 pub use partition::Partition;
@@ -46,6 +46,24 @@ pub use radial::Radial;
 pub use single::{DistanceSample, LightPath, SingleChannel, SingleScattering};
 pub use slab::Slab;
 pub use standard::StandardDipole;
+
+/// Those that the program itself or its tests speak of.
+impl ModelName {
+    /// [`StandardDipole`].
+    pub const STANDARD: Self = Self(&standard::MODEL);
+    /// [`BetterDipole`].
+    pub const BETTER: Self = Self(&better::MODEL);
+    /// [`DirectionalDipole`].
+    pub const DIRECTIONAL: Self = Self(&directional::MODEL);
+    /// [`PhotonBeamDiffusion`].
+    pub const BEAM: Self = Self(&beam::MODEL);
+    /// [`NormalisedDiffusion`].
+    pub const NORMALISED: Self = Self(&normalised::MODEL);
+    /// [`Slab`]; needs a thickness.
+    pub const SLAB: Self = Self(&slab::MODEL);
+    /// Whichever [`choose`] finds best for the medium.
+    pub const AUTO: Self = Self(&auto::MODEL);
+}
 
 /// Where and how light goes in.
 #[derive(Clone, Copy, Debug)]

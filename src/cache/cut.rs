@@ -1,7 +1,7 @@
 //! The sum over a tree of samples, in which one random member stands for each far node.
 
-use super::{Columns, Envelope, Node, Tree, Tuning};
-use crate::bssrdf::{Bssrdf, Exit, Layout};
+use super::{Columns, Envelope, Node, Tree};
+use crate::bssrdf::{Bssrdf, Exit, Layout, Partition};
 use crate::math::{Vec3, Vec4, hash};
 use crate::tally::GatherTally;
 
@@ -16,6 +16,24 @@ const LONG: usize = 4096;
 const DARK_CHANNEL: f32 = 0.02;
 /// Exits at which the sum of a group is guessed, at most.
 const GUESSES: usize = 4;
+
+/// How fine sums are, and of what part.
+#[derive(Clone, Copy, Debug)]
+pub struct Tuning {
+    /// The largest share of the sum that one node of a cut may be wrong by.
+    pub error: f32,
+    /// Means over the samples below this are held to the accuracy of one of this size [S_d flux]; the fourth is 0.
+    pub floor: Vec4,
+    /// The part of S_d that is summed; `notes` and `thinned` sum it whole.
+    pub partition: Partition,
+}
+
+impl Tuning {
+    /// Everything, to a share of `error` of itself.
+    pub fn relative(error: f32) -> Self {
+        Self { error, floor: Vec4::ZERO, partition: Partition::NONE }
+    }
+}
 
 /// Working space of one task.
 pub struct Scratch {

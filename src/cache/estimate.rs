@@ -1,31 +1,13 @@
 //! The estimators by name: what each prepares once a pass, and the sum at an exit.
 
-use super::{Cache, Columns, Cut, Envelope, Scratch, Thinning, notes, thinned};
-use crate::bssrdf::{Bssrdf, Exit, Partition};
-use crate::math::{Rgb, Vec4};
+use super::{Cache, Columns, Cut, Envelope, Scratch, Thinning, Tuning, notes, thinned};
+use crate::bssrdf::{Bssrdf, Exit};
+use crate::math::Rgb;
 use crate::scene::Estimator;
 use crate::tally::GatherTally;
 
 /// Below this many samples `cut` is the plain vectorised sum, which is then faster than any tree.
 pub const PLAIN_SUM: usize = 1024;
-
-/// How fine sums are, and of what part.
-#[derive(Clone, Copy, Debug)]
-pub struct Tuning {
-    /// The largest share of the sum that one node of a cut may be wrong by.
-    pub error: f32,
-    /// Means over the samples below this are held to the accuracy of one of this size [S_d flux]; the fourth is 0.
-    pub floor: Vec4,
-    /// The part of S_d that is summed; `notes` and `thinned` sum it whole.
-    pub partition: Partition,
-}
-
-impl Tuning {
-    /// Everything, to a share of `error` of itself.
-    pub fn relative(error: f32) -> Self {
-        Self { error, floor: Vec4::ZERO, partition: Partition::NONE }
-    }
-}
 
 /// A cache made ready for one estimator.
 pub struct Gatherer {

@@ -10,20 +10,22 @@ mod fill;
 mod near;
 mod notes;
 mod plan;
+mod survey;
 mod thinned;
 mod tree;
 
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
 pub use columns::Columns;
-pub use cut::{Cut, Scratch};
-pub use density::{Density, Seen, Survey, seen};
+pub use cut::{Cut, Scratch, Tuning};
+pub use density::Density;
 pub use envelope::{Envelope, Fall};
-pub use estimate::{Gatherer, PLAIN_SUM, Tuning};
+pub use estimate::{Gatherer, PLAIN_SUM};
 pub use fill::{Directions, Filler, Receiver, Shadow};
 pub use near::{GatherPoint, NearField};
 pub use notes::notes;
 pub use plan::{Plan, SubsurfaceOptions};
+pub use survey::{Seen, Survey, seen};
 pub use thinned::{Thinning, thinned};
 pub use tree::{Node, Tree};
 

@@ -1,8 +1,8 @@
 //! Work that is not lost: checkpoints, going on, parts of a render, signals.
 
+use super::duration::duration;
 use super::files::free_name;
 use super::outputs::{Outputs, is_checkpoint, progress};
-use super::render::duration;
 use marmor::film::{Checkpoint, Film, Format, Identity, Window, check_writable};
 use marmor::render::{Observer, Progress, Spent, Stop};
 use marmor::scene::SceneFile;

@@ -20,6 +20,7 @@ mod check;
 mod compare;
 mod converge;
 mod diff;
+mod duration;
 mod eval;
 mod files;
 mod keep;

@@ -1,8 +1,8 @@
 //! Several ways to render one scene, pass by pass in turns on equal time: shared by `converge` and `compare`.
 
+use super::duration::duration;
 use super::files::{Files, Remedy};
 use super::observers::check_reference;
-use super::render::duration;
 use super::setup::{MethodArgs, Prepared, prepare};
 use super::{stdout, threads};
 use marmor::film::{

@@ -1,6 +1,6 @@
 //! Writing OpenEXR: linear `f32` channels by name, and what they are in attributes.
 
-use super::{Image, Layer, Window};
+use super::{Image, Window};
 use crate::{Error, Result};
 use exr::prelude as exr;
 use std::collections::BTreeMap;
@@ -16,6 +16,17 @@ pub enum Attribute {
     Count(u64),
     /// A number.
     Number(f64),
+}
+
+/// A picture beside the main one in an EXR file, such as `NAME.R`, `NAME.G`, `NAME.B`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Layer {
+    /// Before the dot; without a name there is no dot.
+    pub name: String,
+    /// What stands after the dot, one to three of the picture's channels.
+    pub channels: &'static [&'static str],
+    /// Of the same window as the main picture.
+    pub image: Image,
 }
 
 /// What a picture's file says about itself.

@@ -1,9 +1,7 @@
 //! A picture in memory, and one from a file.
 
-use super::{Window, exr_read, hdr_read};
-use crate::Result;
+use super::Window;
 use crate::math::{Rgb, hash_combine};
-use std::path::Path;
 
 /// Linear radiance for each pixel of a window of the whole picture.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,40 +25,7 @@ pub struct FilePicture {
     pub cube: bool,
 }
 
-impl FilePicture {
-    /// Reads an EXR or a Radiance HDR file, whatever its name. Of an EXR file the channels `R`, `G`, `B`; without them,
-    /// those of the only layer that has them, or the luminance `Y` as grey; with `layer`, channels `layer.R` and so on, or
-    /// `R` and so on in a part of that name. Alpha and all else are ignored. Other primaries become those of Rec. 709,
-    /// values below 0 among them. Pixels of the data window outside the display window (overscan) are left out.
-    ///
-    /// # Errors
-    /// File: not there, of another kind, cut short, channels missing (with the names of those it has), kinds of data that
-    /// are not read (deep data, subsampled channels, new compressions). Memory if it would not fit.
-    pub fn read(path: &Path, layer: Option<&str>) -> Result<Self> {
-        if exr_read::first_bytes(path)?.starts_with(b"#?") {
-            return hdr_read::read(path, layer);
-        }
-        exr_read::read(path, layer)
-    }
-}
-
 impl Image {
-    /// The picture of [`FilePicture::read`] alone.
-    ///
-    /// # Errors
-    /// As there.
-    pub fn read_exr(path: &Path) -> Result<Self> {
-        Self::read_exr_layer(path, None)
-    }
-
-    /// The same of the layer `layer`.
-    ///
-    /// # Errors
-    /// As [`FilePicture::read`].
-    pub fn read_exr_layer(path: &Path, layer: Option<&str>) -> Result<Self> {
-        FilePicture::read(path, layer).map(|read| read.image)
-    }
-
     /// A picture of `resolution` = [width, height], all of it; `pixel(x, y)` gives each value.
     pub fn from_fn(resolution: [u32; 2], mut pixel: impl FnMut(u32, u32) -> Rgb) -> Self {
         let window = Window::full(resolution);

@@ -17,15 +17,16 @@ pub mod metrics;
 mod output;
 mod png_file;
 mod primaries;
+mod read;
 mod self_error;
 mod sums;
 mod variance;
 mod window;
 
-pub use exr_file::{Attribute, Metadata, source_date_epoch};
+pub use exr_file::{Attribute, Layer, Metadata, source_date_epoch};
 pub use exr_read::read_attributes;
 pub use image::{FilePicture, Image};
-pub use output::{Format, Layer, PngOptions, SaveReport, check_writable, png_bytes, save, save_with_layers};
+pub use output::{Format, PngOptions, SaveReport, check_writable, png_bytes, save, save_with_layers};
 pub use png_file::PngReport;
 pub use window::Window;
 

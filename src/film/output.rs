@@ -1,6 +1,6 @@
 //! Saving a picture by the ending of its name.
 
-use super::{Image, Metadata, PngReport, atomic, exr_file, png_file};
+use super::{Image, Layer, Metadata, PngReport, atomic, exr_file, png_file};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::io;
@@ -59,17 +59,6 @@ pub struct SaveReport {
 /// Usage for another ending or an exposure that is not a number; File if it cannot be written.
 pub fn save(image: &Image, path: &Path, metadata: &Metadata, png: PngOptions) -> Result<SaveReport> {
     save_with_layers(image, &[], path, metadata, png)
-}
-
-/// A picture beside the main one in an EXR file, such as `NAME.R`, `NAME.G`, `NAME.B`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Layer {
-    /// Before the dot; without a name there is no dot.
-    pub name: String,
-    /// What stands after the dot, one to three of the picture's channels.
-    pub channels: &'static [&'static str],
-    /// Of the same window as the main picture.
-    pub image: Image,
 }
 
 /// The same with further layers in an EXR; a PNG has no place for them.

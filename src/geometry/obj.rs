@@ -12,10 +12,6 @@ use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::words::counted;
 
-/// Memory while a mesh is read, looked at and put into a tree [bytes/triangle], at its most; measured with a million that have
-/// normals. `cli/need.rs` tells it apart by what takes it.
-pub const LOADING_BYTES: usize = 265;
-
 /// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
 /// left out. Polygons are cut into triangles, concave ones and those with a hole too. Texture coordinates, vertex colours,
 /// weights, materials, smoothing groups and curves are not read; a missing MTL file is no error. What a user should hear of

@@ -6,6 +6,10 @@ use crate::words::either;
 use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
 
+/// Memory while a mesh is read, looked at and put into a tree [bytes/triangle], at its most; measured with a million that have
+/// normals. `cli/need.rs` tells it apart by what takes it.
+pub const LOADING_BYTES: usize = 265;
+
 /// Longer than any real line, polygons of a million corners included; keeps a binary file from being read as one.
 const MAX_LINE: usize = 1 << 24;
 
@@ -118,7 +122,7 @@ impl<R: BufRead> ObjLines<R> {
             return true;
         }
         self.look_at = 2 * count;
-        let needed = count as u128 * super::LOADING_BYTES as u128;
+        let needed = count as u128 * LOADING_BYTES as u128;
         let what = format!("a mesh of {count} or more vertices or triangles");
         let checked = memory::require(needed, memory::available(), &what, "use a coarser mesh");
         self.out_of_memory = checked.err();

@@ -2,6 +2,7 @@
 //! Not for: what the surface does with it (`integrator`, `cache`). Read first: [`Lights`].
 
 mod emitters;
+mod picture;
 mod sky;
 mod suns;
 

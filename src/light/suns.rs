@@ -1,6 +1,6 @@
 //! The bright part of a picture of the environment: what is so small and bright that it is a lamp, not a sky.
 
-use super::sky::Picture;
+use super::picture::Picture;
 use crate::math::Vec3;
 use std::f64::consts::PI;
 

@@ -1,7 +1,7 @@
 //! Rows of a CSV in, the same rows with S_d out: the models' rendering code for scripts and tests.
 
-use super::batch_model::{Inputs, Place, Prepared, Substance};
-use crate::bssrdf::{ModelName, ModelOptions, WidthFit};
+use super::batch_model::{BatchOptions, Inputs, Place, Prepared, Substance};
+use crate::bssrdf::ModelName;
 use crate::error::did_you_mean;
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -9,37 +9,6 @@ use std::fmt::Write as _;
 
 /// Media whose models are kept; rows of a table come back to few media, and memory stays flat if they do not.
 const KEPT_MODELS: usize = 1024;
-
-/// Which model a batch evaluates.
-#[derive(Clone, Copy, Debug)]
-pub struct BatchOptions {
-    /// The model.
-    pub model: ModelName,
-    /// How it is made; thickness and far index are a row's own.
-    pub made: ModelOptions,
-    /// The fit that makes a width of the columns `A` and `l`, model `normalised`.
-    pub width: WidthFit,
-    /// Rows with r: exit by the far face of the `slab`.
-    pub transmitted: bool,
-    /// 0 where the formula is negative, as rendering has it; else the formula's own value.
-    pub clamped: bool,
-    /// Append exact single scattering too: exitance of a plane [1/unit²] per entered flux.
-    pub single: bool,
-}
-
-impl BatchOptions {
-    /// `model` as a scene would use it.
-    pub fn new(model: ModelName) -> Self {
-        Self {
-            model,
-            made: ModelOptions::DEFAULT,
-            width: WidthFit::DiffusionLength,
-            transmitted: false,
-            clamped: false,
-            single: false,
-        }
-    }
-}
 
 /// Evaluates rows under one header.
 pub struct Batch {
@@ -233,6 +202,7 @@ fn field(row: &str, start: usize, end: usize) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bssrdf::WidthFit;
 
     fn run(header: &str, rows: &[&str]) -> Result<Vec<String>> {
         run_with(BatchOptions::new(ModelName::STANDARD), header, rows)

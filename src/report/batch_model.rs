@@ -1,10 +1,42 @@
 //! From the numbers of one row of a batch to a model, and to the values at one pair of points.
 
-use super::BatchOptions;
-use crate::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit, ModelOptions, NormalisedDiffusion, SingleChannel};
+use crate::bssrdf::{
+    Bssrdf, ChannelMedium, Entry, Exit, ModelName, ModelOptions, NormalisedDiffusion, SingleChannel, WidthFit,
+};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{FresnelMoments, Medium};
 use crate::{Error, Result};
+
+/// Which model a batch evaluates.
+#[derive(Clone, Copy, Debug)]
+pub struct BatchOptions {
+    /// The model.
+    pub model: ModelName,
+    /// How it is made; thickness and far index are a row's own.
+    pub made: ModelOptions,
+    /// The fit that makes a width of the columns `A` and `l`, model `normalised`.
+    pub width: WidthFit,
+    /// Rows with r: exit by the far face of the `slab`.
+    pub transmitted: bool,
+    /// 0 where the formula is negative, as rendering has it; else the formula's own value.
+    pub clamped: bool,
+    /// Append exact single scattering too: exitance of a plane [1/unit²] per entered flux.
+    pub single: bool,
+}
+
+impl BatchOptions {
+    /// `model` as a scene would use it.
+    pub fn new(model: ModelName) -> Self {
+        Self {
+            model,
+            made: ModelOptions::DEFAULT,
+            width: WidthFit::DiffusionLength,
+            transmitted: false,
+            clamped: false,
+            single: false,
+        }
+    }
+}
 
 /// How far a given direction or normal may be from unit length.
 const UNIT_TOLERANCE: f64 = 1e-3;

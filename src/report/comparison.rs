@@ -1,9 +1,10 @@
 //! Models against a reference, on one page. What is judged are the pixels of translucent objects: the others are the same
 //! in every model, and would only dilute the difference.
 
+use super::curve::why_not;
 use super::false_colour::colour_bar;
 use super::page::{Page, Picture};
-use super::verdict::{listed, why_not};
+use super::verdict::listed;
 use crate::film::metrics::Estimate;
 use crate::film::{Bias, Brightness, Judgement};
 use crate::words::counted;

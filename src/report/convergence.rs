@@ -2,10 +2,9 @@
 //! in `verdict.rs`.
 
 use super::axis::{Axis, Scale};
-use super::curve::{ALL, Curve, Fit, Point, TRIMMED};
+use super::curve::{ALL, Curve, Fit, Point, TRIMMED, error_text, why_not};
 use super::page::{Page, Picture};
 use super::plot::{COLOURS, DASHES, End, Figure, Panel, Row, Series, Stroke};
-use super::verdict::{error_text, why_not};
 use crate::film::metrics::Estimate;
 use std::fmt::Write as _;
 

@@ -184,6 +184,32 @@ fn between(a: (f64, f64), b: (f64, f64), x: f64) -> f64 {
     if ys { (a.1.ln() + share * (b.1 / a.1).ln()).exp() } else { a.1 + share * (b.1 - a.1) }
 }
 
+/// Why a judgement leaves no verdict by `part` of it, which is over all pixels or trimmed.
+pub(super) fn why_not(judgement: &Judgement, part: &Judged) -> Option<String> {
+    let [x, y] = part.worst_pixel;
+    if judgement.shares_numbers() {
+        let all = &judgement.all;
+        return Some(format!(
+            "it is nearer to the reference (relMSE {:.1e}) than its noise ({:.1e}) lets an independent picture be; do they share \
+             a seed",
+            all.measured,
+            all.noise.unwrap_or(0.0) + all.reference_noise
+        ));
+    }
+    let share = 100.0 * part.worst_share;
+    part.hangs_on_one_pixel().then(|| format!("one pixel carries {share:.0} % of its error (pixel {x},{y})"))
+}
+
+/// A relMSE with its interval.
+pub(super) fn error_text(error: &Estimate) -> String {
+    match error.interval {
+        Some([low, high]) if low > 0.0 => format!("relMSE {:.2e} (95 %: {low:.2e} to {high:.2e})", error.value),
+        Some([_, high]) if high > 0.0 => format!("relMSE below {high:.1e}, not told from the reference's noise"),
+        Some(_) => "no difference at all".into(),
+        None => format!("relMSE {:.1e} (interval unknown)", error.value),
+    }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;

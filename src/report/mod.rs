@@ -18,7 +18,8 @@ mod records;
 mod verdict;
 
 pub use axis::{Axis, Scale};
-pub use batch::{Batch, BatchOptions};
+pub use batch::Batch;
+pub use batch_model::BatchOptions;
 pub use comparison::{Compared, Figures, ModelComparison, Part as PicturePart};
 pub use convergence::Convergence;
 pub use curve::{Curve as ErrorCurve, Fit, Point as ErrorPoint, Reached};

@@ -1,9 +1,9 @@
 //! What curves say, in sentences: a verdict only where 95 % intervals are apart, and each figure with its interval.
 
 use super::convergence::Convergence;
-use super::curve::{ALL, Curve, Reached, Set, TRIMMED};
+use super::curve::{ALL, Curve, Reached, Set, TRIMMED, error_text, why_not};
+use crate::film::Bias;
 use crate::film::metrics::Estimate;
-use crate::film::{Bias, Judged, Judgement};
 
 /// Errors within this factor of each other are as good as equal: times on a machine with other work vary as much.
 const AS_GOOD: f64 = 1.15;
@@ -201,22 +201,6 @@ fn standing(curve: &Curve, seconds: f64) -> Option<Standing> {
     Some(Standing { name: curve.name.clone(), trimmed, all, no_verdict, no_verdict_all })
 }
 
-/// Why a judgement leaves no verdict by `part` of it, which is over all pixels or trimmed.
-pub(super) fn why_not(judgement: &Judgement, part: &Judged) -> Option<String> {
-    let [x, y] = part.worst_pixel;
-    if judgement.shares_numbers() {
-        let all = &judgement.all;
-        return Some(format!(
-            "it is nearer to the reference (relMSE {:.1e}) than its noise ({:.1e}) lets an independent picture be; do they share \
-             a seed",
-            all.measured,
-            all.noise.unwrap_or(0.0) + all.reference_noise
-        ));
-    }
-    let share = 100.0 * part.worst_share;
-    part.hangs_on_one_pixel().then(|| format!("one pixel carries {share:.0} % of its error (pixel {x},{y})"))
-}
-
 /// Whether the intervals are apart, by more than times vary.
 fn is_behind(best: &Standing, other: &Standing) -> bool {
     match (best.trimmed.interval, other.trimmed.interval) {
@@ -229,16 +213,6 @@ fn all_pixels_text(standing: &Standing) -> String {
     match &standing.no_verdict_all {
         Some(why) => format!("{} {}, no verdict: {why}", standing.name, error_text(&standing.all)),
         None => format!("{} {}", standing.name, error_text(&standing.all)),
-    }
-}
-
-/// A relMSE with its interval.
-pub(super) fn error_text(error: &Estimate) -> String {
-    match error.interval {
-        Some([low, high]) if low > 0.0 => format!("relMSE {:.2e} (95 %: {low:.2e} to {high:.2e})", error.value),
-        Some([_, high]) if high > 0.0 => format!("relMSE below {high:.1e}, not told from the reference's noise"),
-        Some(_) => "no difference at all".into(),
-        None => format!("relMSE {:.1e} (interval unknown)", error.value),
     }
 }
 
@@ -264,6 +238,7 @@ mod tests {
     use super::super::curve::tests::judged;
     use super::super::curve::{Curve, Point};
     use super::*;
+    use crate::film::{Judged, Judgement};
 
     /// Errors of `level` / seconds plus `floor`, a pass each `pass` seconds up to 20, intervals of `width`.
     fn curve(name: &str, level: f64, floor: f64, pass: f64, width: f64) -> Curve {

@@ -1,6 +1,6 @@
 //! What is wrong with the objects' meshes, and what marmor does about it.
 
-use super::{Object, Surface};
+use super::{Object, ObstacleKind, Scene, Surface};
 use crate::geometry::Seam;
 use crate::words::{counted, either, short};
 
@@ -16,8 +16,23 @@ pub struct Remark {
 /// Vertices lie on a grid: a step of more than this share of the object's size shows.
 pub(super) const COARSE: f64 = 1e-4;
 
+impl Scene {
+    /// What there is to say about the mesh of one of [`Self::objects`]; nothing if it is sound.
+    pub fn remarks(&self, object: &Object) -> Vec<Remark> {
+        let mut remarks = remarks(object, &self.materials[object.material].surface);
+        // Of sheets and walls their obstacles say it all.
+        if object.findings.open_edges > 0 && self.has(object, ObstacleKind::Sheet) {
+            remarks.retain(|r| !r.text.contains("rims of holes"));
+        }
+        if object.findings.non_manifold_edges > 0 && self.has(object, ObstacleKind::Walls) {
+            remarks.retain(|r| !r.text.contains("more than two triangles"));
+        }
+        remarks
+    }
+}
+
 /// What there is to say about `object` with this surface; nothing if its mesh is sound.
-pub(super) fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
+fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
     let (found, mut remarks) = (&object.findings, Vec::new());
     let mut say = |warns: bool, text: String| remarks.push(Remark { text, warns });
     let all = counted(found.triangles, "triangle", "triangles");

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::file::{RADIANCE, colour, rgb};
 use super::tree::Fields;
+use super::values::{RADIANCE, colour, rgb};
 use crate::error::{Error, Result};
 use crate::film::{FilePicture, Image};
 use crate::math::Rgb;

@@ -3,9 +3,10 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::file::{FovAxis, SceneFile, unit_vector};
+use super::file::{FovAxis, SceneFile};
 use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
+use super::values::unit_vector;
 use super::{
     Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
 };

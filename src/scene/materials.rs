@@ -1,7 +1,7 @@
 //! `[material.NAME]` as typed.
 
-use super::file::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
 use super::tree::{Fields, Node};
+use super::values::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
 use super::{Emission, Surface, Translucent};
 use crate::bssrdf::ModelName;
 use crate::error::Result;

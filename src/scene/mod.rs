@@ -9,6 +9,7 @@ mod doctor;
 mod energy;
 mod environment;
 mod file;
+mod insides;
 mod load;
 mod materials;
 mod objects;
@@ -18,6 +19,7 @@ mod options;
 mod precision;
 mod tree;
 mod untraceable;
+mod values;
 mod view;
 mod warnings;
 mod world;
@@ -33,6 +35,6 @@ pub use world::{Emission, Material, Object, Scene, Surface, Translucent};
 // For what is above this room.
 #[doc(hidden)]
 pub use self::{
-    camera::Camera, difference::difference, doctor::Remark, environment::Environment, obstacles::Insides,
+    camera::Camera, difference::difference, doctor::Remark, environment::Environment, insides::Insides,
     options::default_photons, view::View,
 };

@@ -4,10 +4,10 @@ use glam::DMat3;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use super::file::{named_value, switch, unknown, vector};
 use super::materials::MaterialEntry;
 use super::options::named;
 use super::tree::{Fields, Node, Value};
+use super::values::{named_value, switch, unknown, vector};
 use crate::error::Result;
 use crate::math::DVec3;
 

@@ -1,11 +1,11 @@
 //! What stands in the way of knowing which medium is where: bodies in one another, surfaces that touch, meshes without an inside, lamps
 //! and cameras in media. Read first: [`Obstacle`] and [`Found::new`]; docs/robustness.md has the table.
 
+use super::insides::Found;
 use super::{Object, Obstacle, ObstacleKind, Scene};
 use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, meeting, mended};
 use crate::math::DVec3;
 use crate::words::{self, counted, either, percent};
-use std::sync::OnceLock;
 
 /// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
 const OFFSETS: f64 = 2.0;
@@ -22,16 +22,6 @@ const MOSTLY_HOLES: f64 = 0.05;
 /// After so many pairs of objects that meet, only those are looked at of which one has not met any yet: in a heap of thousands every pair
 /// may.
 const MOST_MEETINGS: usize = 1000;
-
-/// What is inside what in a scene, once somebody has asked; see [`Scene::obstacles`].
-#[derive(Debug, Default)]
-pub struct Insides(OnceLock<Found>);
-
-#[derive(Debug, Default)]
-struct Found {
-    obstacles: Vec<Obstacle>,
-    camera_in: Option<u32>,
-}
 
 impl Scene {
     /// What stands in the way of knowing which medium is where, for every translucent object; looked for when it is first asked.

@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Camera, Environment, Insides, ObstacleKind, Remark, doctor};
+use super::{Camera, Environment, Insides, ObstacleKind};
 use crate::bssrdf::{Bssrdf, ModelName, ModelOptions, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -129,19 +129,6 @@ pub struct Translucent {
 }
 
 impl Scene {
-    /// What there is to say about the mesh of one of [`Self::objects`]; nothing if it is sound.
-    pub fn remarks(&self, object: &Object) -> Vec<Remark> {
-        let mut remarks = doctor::remarks(object, &self.materials[object.material].surface);
-        // Of sheets and walls their obstacles say it all.
-        if object.findings.open_edges > 0 && self.has(object, ObstacleKind::Sheet) {
-            remarks.retain(|r| !r.text.contains("rims of holes"));
-        }
-        if object.findings.non_manifold_edges > 0 && self.has(object, ObstacleKind::Walls) {
-            remarks.retain(|r| !r.text.contains("more than two triangles"));
-        }
-        remarks
-    }
-
     /// Whether an obstacle of this kind concerns one of [`Self::objects`].
     pub fn has(&self, object: &Object, kind: ObstacleKind) -> bool {
         self.obstacles().iter().any(|o| o.kind == kind && o.objects.contains(&object.name))

@@ -3,7 +3,6 @@
 use super::draws::Draws;
 use super::facets::Bend;
 use super::spectrum::{Coefficients, Spectrum};
-use super::through::Through;
 use crate::geometry::{Clearance, SurfacePoint};
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
@@ -31,8 +30,6 @@ pub struct Body {
     pub endless: bool,
     /// What a path on the wrong side of its surface is lost by.
     pub leak: Cause,
-    /// How lamps are asked for at collisions.
-    pub through: Option<Through>,
     /// Collisions between two looks at the weight.
     pub patience: u32,
 }
@@ -107,7 +104,7 @@ pub enum Flight {
 
 impl Body {
     /// The object number `object`, with a table of the surfaces in its box.
-    pub fn new(object: u32, medium: &Medium, clearance: Clearance, through: Option<Through>) -> Self {
+    pub fn new(object: u32, medium: &Medium, clearance: Clearance) -> Self {
         let coefficients = Coefficients::new(medium);
         let absorbed = 1.0 - coefficients.albedo.max();
         let extinctions = coefficients.sigma_t.0.into_iter().filter(|s| *s > 0.0);
@@ -122,7 +119,6 @@ impl Body {
             clearance,
             endless: false,
             leak: Cause::Rounding,
-            through,
         }
     }
 

@@ -78,7 +78,7 @@ impl<'a> CameraPath<'a> {
             Some(hit) => {
                 let share = self.left.map_or(1.0, |(body, straight)| match straight {
                     // Met by chance alone, and seldom: white specks.
-                    None if body.through.as_ref().is_some_and(|t| t.alone(hit.mesh)) => 0.0,
+                    None if self.method.through(body).is_some_and(|t| t.alone(hit.mesh)) => 0.0,
                     None => 1.0,
                     Some(_) => self.share(&hit, ray.direction),
                 });
@@ -117,10 +117,12 @@ impl<'a> CameraPath<'a> {
     fn share_of_sun(&self, by_table: f32) -> f32 {
         match (self.by_cosine, &self.left) {
             (Some(by_cosine), _) => by_cosine / (by_cosine + by_table),
-            (None, Some((body, Some(straight)))) => sun_share_by_chance(body, straight, by_table),
+            (None, Some((body, Some(straight)))) => {
+                sun_share_by_chance((body, self.method.through(body)), straight, by_table)
+            }
             // Met by chance alone, and seldom: white specks, which single scattering beside models leaves out.
             (None, Some((body, None))) if self.method.once => {
-                let alone = body.through.as_ref().is_some_and(|t| t.sun_alone(by_table));
+                let alone = self.method.through(body).is_some_and(|t| t.sun_alone(by_table));
                 if alone { 0.0 } else { 1.0 }
             }
             _ => 1.0,
@@ -130,7 +132,8 @@ impl<'a> CameraPath<'a> {
     /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision before.
     fn share(&self, hit: &Hit, direction: Vec3) -> f32 {
         let Some((body, Some(straight))) = &self.left else { return 1.0 };
-        share_by_chance(self.view.scene, &self.method.light.lights, body, straight, hit, direction)
+        let lit = (*body, self.method.through(body));
+        share_by_chance(self.view.scene, &self.method.light.lights, lit, straight, hit, direction)
     }
 
     /// Goes on from a surface that the camera sees.
@@ -287,12 +290,12 @@ impl Watch for Gather<'_, '_> {
             return path.other > 0.0;
         }
         let orders = path.method.options.orders;
-        if body.through.is_some() && orders.contains(path.order) {
+        if let Some(through) = path.method.through(body).filter(|_| orders.contains(path.order)) {
             let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut *path.tally);
             let lights = &path.method.light.lights;
             for (drawn, there) in [(Drawn::Lamps, lights.has_emitters()), (Drawn::Suns, lights.has_suns())] {
                 if there {
-                    let from = (body, lights, drawn);
+                    let from = ((body, through), lights, drawn);
                     path.radiance += drawn_light(path.view, from, (x, w), spectrum, found, coins, tally) * path.direct;
                 }
             }

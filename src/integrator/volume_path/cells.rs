@@ -1,7 +1,17 @@
 //! Photons in cubes of space, to find those within reach of a point.
 
-use super::photons::Photon;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
+
+/// Light scattered at a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Photon {
+    /// The point [unit].
+    pub x: DVec3,
+    /// Unit direction in which the light came.
+    pub w: Vec3,
+    /// Flux that is scattered [radiance unit x sr x unit²]; all photons of a pass together stand for the whole.
+    pub flux: Rgb,
+}
 
 /// Photons sorted by the cube they lie in.
 pub struct Cells {

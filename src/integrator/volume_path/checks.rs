@@ -1,9 +1,8 @@
 //! Photons and their connections, each alone, against sums that do not know them.
 
-use super::cells::Cells;
+use super::cells::{Cells, Photon};
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
-use super::photons::Photon;
 use super::*;
 use crate::math::{DVec3, GaussLegendre, Vec3};
 use crate::optics::{HenyeyGreenstein, transmittance};

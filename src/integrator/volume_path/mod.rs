@@ -65,6 +65,7 @@ pub struct VolumePath {
     light: DirectLight,
     /// One for each object; `None` where it is not translucent.
     bodies: Vec<Option<Body>>,
+    throughs: Vec<Option<Through>>,
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps and suns on the body itself, once photons have that.
     persistence: f32,
@@ -90,8 +91,7 @@ impl VolumePath {
             return Err(Error::scene(refusals.join("\n")));
         }
         let lights = Lights::new(scene);
-        let bodies: Vec<Option<Body>> =
-            (0..scene.objects.len()).map(|i| body(scene, &lights, i, CLEARANCE_CELLS)).collect();
+        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(|i| body(scene, i, CLEARANCE_CELLS)).collect();
         let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
         let shines = lights.has_emitters() || lights.has_suns();
         let source = |body: &Option<Body>| {
@@ -106,8 +106,9 @@ impl VolumePath {
         // Of an environment, what is beside suns is met by paths that go on.
         let beside = if lights.has_environment() { lights.share_beside_suns() } else { 0.0 };
         let persistence = beside.sqrt().max(least);
+        let throughs = throughs(scene, &lights, &bodies);
         let light = DirectLight { lights, samples: 1 };
-        Ok(Self { options, light, bodies, sources, persistence, camera_in: scene.camera_in(), once: false })
+        Ok(Self { options, light, bodies, throughs, sources, persistence, camera_in: scene.camera_in(), once: false })
     }
 
     /// What to say of `scene` before it is rendered: light that may not be found.
@@ -190,11 +191,12 @@ impl VolumePath {
         let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
         let endless = |body: Body| Body { endless: true, ..body };
         let lights = Lights::new(scene);
-        let body = |i| if wanted(i) { body(scene, &lights, i, 1).map(endless) } else { None };
+        let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
         let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
         let sources = bodies.iter().map(|_| None).collect();
+        let throughs = throughs(scene, &lights, &bodies);
         let light = DirectLight { lights, samples: 1 };
-        Self { options, light, bodies, sources, persistence: 1.0, camera_in: None, once: true }
+        Self { options, light, bodies, throughs, sources, persistence: 1.0, camera_in: None, once: true }
     }
 
     /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
@@ -208,9 +210,14 @@ impl VolumePath {
         path.radiance
     }
 
+    /// How lamps and suns are asked for at collisions in `body`.
+    fn through(&self, body: &Body) -> Option<&Through> {
+        self.throughs[body.object as usize].as_ref()
+    }
+
     /// Whether a path of [`Self::once`] can find no more light once lamps have been asked for.
     fn points_are_all(&self, body: &Body) -> bool {
-        let lamps = || body.through.as_ref().is_some_and(|t| t.all_alone);
+        let lamps = || self.through(body).is_some_and(|t| t.all_alone);
         self.once && !self.light.lights.has_environment() && lamps()
     }
 
@@ -220,15 +227,13 @@ impl VolumePath {
 }
 
 /// The body of object number `index`, where it is translucent and has a size.
-fn body(scene: &Scene, lights: &Lights, index: usize, cells: u32) -> Option<Body> {
+fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
     let Some(t) = &scene.materials[object.material].surface.inside else { return None };
     let (lo, hi) = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, lo, hi, cells);
-    let scatters = t.medium.sigma_s.max() > 0.0;
-    let through = || Through::new(scene, lights, index as u32, t.medium.eta, t.medium.g as f32);
-    let body = Body::new(index as u32, &t.medium, clearance, scatters.then(through).flatten());
+    let body = Body::new(index as u32, &t.medium, clearance);
     let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
     let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {
         ObstacleKind::Sheet | ObstacleKind::Holes => Some(Cause::Hole),
@@ -237,6 +242,15 @@ fn body(scene: &Scene, lights: &Lights, index: usize, cells: u32) -> Option<Body
         _ => None,
     });
     Some(Body { leak: leak.unwrap_or(Cause::Rounding), ..body })
+}
+
+/// How lamps and suns are asked for in each of the bodies that scatter.
+fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Body>]) -> Vec<Option<Through>> {
+    let of = |body: &Option<Body>| {
+        let body = body.as_ref().filter(|body| body.medium.albedo.max() > 0.0)?;
+        Through::new(scene, lights, body.object, body.eta, body.phase.g as f32)
+    };
+    bodies.iter().map(of).collect()
 }
 
 impl Integrator for VolumePath {

@@ -1,14 +1,14 @@
 //! Light traced from lamps and suns into a body: where it is scattered, for paths from the camera to connect to.
 
 use super::body::{Body, Edge, Watch};
-use super::cells::Cells;
+use super::cells::{Cells, Photon};
 use super::draws::Draws;
 use super::emission::{Emission, Entering};
 use super::spectrum::Spectrum;
 use crate::geometry::AreaTable;
 use crate::integrator::View;
 use crate::light::Lights;
-use crate::math::{DVec3, Rgb, Vec3, hash_combine};
+use crate::math::{DVec3, Vec3, hash_combine};
 use crate::optics::refract;
 use crate::sampling::{CacheStream, Points, Turn};
 use crate::scene::Scene;
@@ -16,17 +16,6 @@ use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::sync::OnceLock;
-
-/// Light scattered at a point.
-#[derive(Clone, Copy, Debug)]
-pub struct Photon {
-    /// The point [unit].
-    pub x: DVec3,
-    /// Unit direction in which the light came.
-    pub w: Vec3,
-    /// Flux that is scattered [radiance unit x sr x unit²]; all photons of a pass together stand for the whole.
-    pub flux: Rgb,
-}
 
 /// What one body's photons are made from, pass after pass.
 pub struct Source {

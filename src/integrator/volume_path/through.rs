@@ -136,7 +136,7 @@ pub enum Drawn {
 /// chance, with its inverse as weight. Light reflected inside on its way is not in it.
 pub fn drawn_light(
     view: View<'_>,
-    (body, lights, drawn): (&Body, &Lights, Drawn),
+    ((body, through), lights, drawn): ((&Body, &Through), &Lights, Drawn),
     (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
@@ -145,15 +145,12 @@ pub fn drawn_light(
 ) -> Rgb {
     let u = [draws.number(), draws.number(), draws.number()];
     let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
-    let through = body.through.as_ref();
     let asked = match drawn {
-        Drawn::Lamps => {
-            lights.point(view.scene, u).map(|lamp| (Asked::Lamp(lamp), through.is_some_and(|t| t.alone(lamp.object))))
-        }
-        Drawn::Suns => lights.sun(u).map(|sun| (Asked::Sun(sun), through.is_some_and(|t| t.sun_alone(sun.pdf_angle)))),
+        Drawn::Lamps => lights.point(view.scene, u).map(|lamp| (Asked::Lamp(lamp), through.alone(lamp.object))),
+        Drawn::Suns => lights.sun(u).map(|sun| (Asked::Sun(sun), through.sun_alone(sun.pdf_angle))),
     };
     let Some(asked) = asked else { return Rgb::BLACK };
-    spectrum.value(&body.medium) * arriving(view, body, &asked, (x, w), horizon, found, draws, tally)
+    spectrum.value(&body.medium) * arriving(view, (body, through), &asked, (x, w), horizon, found, draws, tally)
 }
 
 /// How far away facets are looked for; `None` where no surface is that near.
@@ -166,7 +163,7 @@ fn horizon(body: &Body, x: DVec3, draws: &mut Draws) -> Option<f32> {
 #[allow(clippy::too_many_arguments)] // what both callers have
 fn arriving(
     view: View<'_>,
-    body: &Body,
+    (body, through): (&Body, &Through),
     (asked, alone): &(Asked, bool),
     (x, w): (DVec3, Vec3),
     horizon: f32,
@@ -174,7 +171,6 @@ fn arriving(
     draws: &mut Draws,
     tally: &mut Tally,
 ) -> Rgb {
-    let Some(through) = &body.through else { return Rgb::BLACK };
     let decay = body.least_extinction;
     let mesh = &view.scene.objects[body.object as usize].mesh;
     through.facets.crossings(mesh, x, asked.place(), horizon, found);
@@ -261,12 +257,12 @@ fn is_open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &A
 pub fn share_by_chance(
     scene: &Scene,
     lights: &Lights,
-    body: &Body,
+    (body, through): (&Body, Option<&Through>),
     straight: &Straight,
     hit: &Hit,
     direction: Vec3,
 ) -> f32 {
-    let Some(through) = &body.through else { return 1.0 };
+    let Some(through) = through else { return 1.0 };
     if through.alone(hit.mesh) {
         return 0.0;
     }
@@ -278,8 +274,8 @@ pub fn share_by_chance(
 }
 
 /// The same for a sun, drawn with density `by_point` [1/sr], and [`drawn_light`].
-pub fn sun_share_by_chance(body: &Body, straight: &Straight, by_point: f32) -> f32 {
-    let Some(through) = &body.through else { return 1.0 };
+pub fn sun_share_by_chance((body, through): (&Body, Option<&Through>), straight: &Straight, by_point: f32) -> f32 {
+    let Some(through) = through else { return 1.0 };
     if through.sun_alone(by_point) {
         return 0.0;
     }
@@ -334,6 +330,7 @@ mod tests {
         let view = View { scene: &scene, rays: &*rays };
         let method = VolumePath::new(&scene, OPTIONS).unwrap();
         let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
+        let through = method.through(body);
         let (mut points, mut chance) = (Mean::default(), Mean::default());
         let (mut found, mut tally) = (Vec::new(), Tally::default());
         for i in 0..samples {
@@ -353,14 +350,14 @@ mod tests {
                 let phase = body.phase(w, to);
                 let straight = Straight { phase, length, cosines: [mu, out.dot(at.n_geometric)] };
                 let light = emitted(&scene, &hit, out)[0] * passed;
-                lucky = [light, light * share_by_chance(&scene, lights, body, &straight, &hit, out)];
+                lucky = [light, light * share_by_chance(&scene, lights, (body, through), &straight, &hit, out)];
             }
             chance.add(lucky[0]);
             // Far less noisy, but slower.
             if i % 12 == 0 {
                 let light = drawn_light(
                     view,
-                    (body, lights, Drawn::Lamps),
+                    ((body, through.unwrap()), lights, Drawn::Lamps),
                     (x, w),
                     &spectrum,
                     &mut found,
@@ -413,6 +410,7 @@ mod tests {
             let view = View { scene: &scene, rays: &*rays };
             let method = VolumePath::new(&scene, OPTIONS).unwrap();
             let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
+            let through = method.through(body);
             let (mut found, mut tally, mut most) = (Vec::new(), Tally::default(), 0.0_f32);
             for i in 0..100_000 {
                 let mut draws = Draws::new(&[], i);
@@ -421,7 +419,7 @@ mod tests {
                 let w = draws.direction();
                 let light = drawn_light(
                     view,
-                    (body, lights, Drawn::Lamps),
+                    ((body, through.unwrap()), lights, Drawn::Lamps),
                     (x, w),
                     &spectrum,
                     &mut found,

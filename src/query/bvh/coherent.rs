@@ -6,9 +6,9 @@
 
 use super::build::Tree;
 use super::node::{Child, NodeRay, Slabs, WIDENED, WIDTH};
-use super::stack::Stack;
+use super::stack::{STACK, Stack};
 use super::triangle::{LANES, Shear, Sheared, longest_axis};
-use super::walk::{Closest, Found, OneRay, STACK};
+use super::walk::{Closest, Found, OneRay};
 use crate::math::{F8, LaneKernel, Simd, splat3};
 use crate::query::Ray;
 

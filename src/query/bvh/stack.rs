@@ -2,6 +2,9 @@
 
 use std::mem::MaybeUninit;
 
+/// Entries of a traversal's stack; the builder makes no tree that needs more.
+pub const STACK: usize = 256;
+
 /// What is still to visit, with the distance at which the ray enters it.
 pub struct Stack<T, const N: usize> {
     entries: [MaybeUninit<(T, f32)>; N],

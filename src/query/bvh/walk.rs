@@ -2,13 +2,10 @@
 
 use super::build::Tree;
 use super::node::{Child, NodeRay, WIDTH};
-use super::stack::Stack;
+use super::stack::{STACK, Stack};
 use super::triangle::TriangleRay;
 use crate::math::{LaneKernel, Simd};
 use crate::query::Ray;
-
-/// Entries of a traversal's stack; the builder makes no tree that needs more.
-pub const STACK: usize = 256;
 
 /// The best hit so far, by its place in the tree.
 #[derive(Clone, Copy)]

@@ -1,0 +1,40 @@
+//! Reading a picture, whatever kind of file it is.
+
+use super::{FilePicture, Image, exr_read, hdr_read};
+use crate::Result;
+use std::path::Path;
+
+impl FilePicture {
+    /// Reads an EXR or a Radiance HDR file, whatever its name. Of an EXR file the channels `R`, `G`, `B`; without them,
+    /// those of the only layer that has them, or the luminance `Y` as grey; with `layer`, channels `layer.R` and so on, or
+    /// `R` and so on in a part of that name. Alpha and all else are ignored. Other primaries become those of Rec. 709,
+    /// values below 0 among them. Pixels of the data window outside the display window (overscan) are left out.
+    ///
+    /// # Errors
+    /// File: not there, of another kind, cut short, channels missing (with the names of those it has), kinds of data that
+    /// are not read (deep data, subsampled channels, new compressions). Memory if it would not fit.
+    pub fn read(path: &Path, layer: Option<&str>) -> Result<Self> {
+        if exr_read::first_bytes(path)?.starts_with(b"#?") {
+            return hdr_read::read(path, layer);
+        }
+        exr_read::read(path, layer)
+    }
+}
+
+impl Image {
+    /// The picture of [`FilePicture::read`] alone.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn read_exr(path: &Path) -> Result<Self> {
+        Self::read_exr_layer(path, None)
+    }
+
+    /// The same of the layer `layer`.
+    ///
+    /// # Errors
+    /// As [`FilePicture::read`].
+    pub fn read_exr_layer(path: &Path, layer: Option<&str>) -> Result<Self> {
+        FilePicture::read(path, layer).map(|read| read.image)
+    }
+}
