@@ -28,7 +28,7 @@ pub use doctor::Remark;
 pub use environment::{Environment, EnvironmentEntry};
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
-pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
+pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
 pub use obstacles::Insides;
 pub use options::{

@@ -86,10 +86,10 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
         said.extend(found.map(|what| format!("{head}: {what}")));
         if let Surface::Translucent(t) = &scene.materials[object.material].surface
-            && let Some((lo, hi)) = object.mesh.bounds()
+            && let Some(bounds) = object.mesh.bounds()
         {
             // Of a body that light hardly meets no model need be spoken.
-            if let Some(what) = thin(t, (hi - lo).length()) {
+            if let Some(what) = thin(t, bounds.extent().length()) {
                 said.push(format!("{head}: {what}"));
             } else if models_are_used(file) && !scene.has(object, ObstacleKind::Sheet) {
                 let material = &scene.materials[object.material].name;

@@ -207,9 +207,9 @@ impl VolumePath {
 fn body(scene: &Scene, lights: &Lights, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
     let Surface::Translucent(t) = &scene.materials[object.material].surface else { return None };
-    let (lo, hi) = object.mesh.bounds()?;
+    let bounds = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
-    let clearance = Clearance::new(meshes, lo, hi, cells);
+    let clearance = Clearance::new(meshes, bounds, cells);
     let scatters = t.medium.sigma_s.max() > 0.0;
     let through = || Through::new(scene, lights, index as u32, t.medium.eta, t.medium.g as f32);
     let body = Body::new(index as u32, &t.medium, clearance, scatters.then(through).flatten());
