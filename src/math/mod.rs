@@ -5,11 +5,9 @@ mod aabb;
 mod exp;
 mod frame;
 mod hash;
-#[allow(unsafe_code)] // calls instructions that the machine was asked for; nothing else
 mod lanes;
 mod quadrature;
 mod rgb;
-#[allow(unsafe_code)] // calls code compiled for instruction sets that it has just looked for; nothing else
 mod simd;
 
 pub use aabb::{Aabb, Aabb32};
