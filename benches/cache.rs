@@ -39,9 +39,9 @@ fn scene() -> (Scene, tempfile::TempDir) {
         Ok(path) => {
             std::fs::copy(&path, folder.path().join("mesh.obj")).unwrap();
             let mesh = load_obj(path.as_ref()).unwrap();
-            let (lo, hi) = mesh.bounds().unwrap();
-            let scale = 100.0 / (hi - lo).max_element();
-            let [x, y, z] = (-0.5 * scale * (lo + hi)).to_array();
+            let bounds = mesh.bounds().unwrap();
+            let scale = 100.0 / bounds.extent().max_element();
+            let [x, y, z] = (-scale * bounds.centre()).to_array();
             format!("mesh = \"mesh.obj\"\ntransform = {{ scale = {scale}, translate = [{x}, {y}, {z}] }}\n")
         }
         Err(_) => {

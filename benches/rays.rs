@@ -138,8 +138,8 @@ fn in_turns(kinds: &[Kind], backends: &[(Backend, Box<dyn RayQuery + '_>)]) {
 fn kinds(mesh: &Mesh, query: &dyn RayQuery) -> Vec<Kind> {
     const SIDE: u32 = 384;
     const SQUARE: u32 = 8;
-    let (lower, upper) = mesh.bounds().unwrap();
-    let (centre, size) = ((lower + upper) * 0.5, (upper - lower).max_element());
+    let bounds = mesh.bounds().unwrap();
+    let (centre, size) = (bounds.centre(), bounds.extent().max_element());
     let eye = centre + DVec3::new(0.3, 0.4, 1.6) * size;
     let forward = (centre - eye).normalize().as_vec3();
     let right = forward.cross(Vec3::Y).normalize();

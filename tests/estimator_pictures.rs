@@ -133,9 +133,9 @@ fn every_estimator_paints_the_lotus_as_the_sum_over_all_samples_does() {
 #[ignore = "minutes, and a mesh that is not ours"]
 fn every_estimator_paints_a_given_mesh_as_the_sum_over_all_samples_does() {
     let path = std::path::PathBuf::from(std::env::var("MARMOR_BENCH_OBJ").expect("MARMOR_BENCH_OBJ names a mesh"));
-    let (lo, hi) = marmor::geometry::load_obj(&path).unwrap().bounds().unwrap();
-    let scale = 100.0 / (hi - lo).max_element();
-    let [x, y, z] = (-0.5 * scale * (lo + hi)).to_array();
+    let bounds = marmor::geometry::load_obj(&path).unwrap().bounds().unwrap();
+    let scale = 100.0 / bounds.extent().max_element();
+    let [x, y, z] = (-scale * bounds.centre()).to_array();
     let mut scene = load(
         &format!(
             "unit = \"mm\"\n[camera]\nposition = [0, 5, 320]\nlook_at = [0, 0, 0]\nfov = 22\nresolution = [96, 96]\n\

@@ -14,11 +14,12 @@ use marmor::geometry::{examine, load_obj, mended};
 use marmor::integrator::{Direct, Subsurface, SubsurfaceOptions};
 use marmor::math::{DVec3, Rgb, hash};
 use marmor::report::{Batch, BatchOptions};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Scene, SceneFile};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
+
+mod rendering;
 
 /// No input of a few kilobytes may take longer, in the suite's build too.
 const LONGEST: Duration = Duration::from_secs(20);
@@ -254,18 +255,7 @@ fn scene() {
         let Ok(scene) = Scene::load(&file) else { return false };
         // Tables of both methods with light, as a render would make them.
         let _ = Direct::new(&scene, 1);
-        let options = SubsurfaceOptions {
-            single: false,
-            cache_samples: 100,
-            estimator: Estimator::Cut,
-            cut_error: Some(0.1),
-            entry: EntrySampling::Light,
-            points: Points::Sobol,
-            spread: Spread::Seen,
-            specular: true,
-            light_samples: 1,
-            seed: 1,
-        };
+        let options = SubsurfaceOptions { cut_error: Some(0.1), ..rendering::options(Estimator::Cut, 100, 1) };
         let _ = Subsurface::new(&scene, options);
         scene.objects.iter().for_each(|o| drop(scene.remarks(o)));
         true

@@ -9,7 +9,7 @@ mod shapes;
 use marmor::film::{Film, Window};
 use marmor::geometry::{ObjMesh, write_obj};
 use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
-use marmor::math::{DVec3, hash, unit_f64};
+use marmor::math::{DAffine3, DVec3, hash, unit_f64};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::scene::{ObstacleKind, Orders, Scene, SceneFile};
@@ -244,7 +244,9 @@ fn scene(number: u64) -> (Scene, Vec<(Placed, f64)>) {
         middle += turn * body.centre / bodies.len() as f64;
     }
     for (k, parts) in meshes.iter().enumerate() {
-        let mesh = parts.iter().map(|&b| bodies[b].mesh.clone().placed(turn, turn * bodies[b].centre));
+        let mesh = parts
+            .iter()
+            .map(|&b| bodies[b].mesh.clone().placed(DAffine3::from_mat3_translation(turn, turn * bodies[b].centre)));
         let mesh = mesh.reduce(|a, b| joined(a, &b)).unwrap();
         far = mesh.positions.iter().map(|p| p.distance(middle)).fold(far, f64::max);
         let mut obj = Vec::new();

@@ -11,13 +11,15 @@ use marmor::math::{Rgb, Vec3};
 use marmor::optics::{reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Orders, Scene, SceneFile};
 use marmor::tally::Tally;
+use rendering::backends;
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
+
+mod rendering;
 
 /// A scene by numbers: lengths times `scale`, coefficients over it, places plus `shift`.
 struct Built {
@@ -139,22 +141,7 @@ fn scenes(scale: f64, shift: [f64; 3]) -> Vec<(&'static str, Scene)> {
 }
 
 fn options(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
-    SubsurfaceOptions {
-        single: true,
-        cache_samples,
-        estimator,
-        cut_error: Some(0.1),
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        spread: Spread::Seen,
-        specular: true,
-        light_samples: 1,
-        seed: 3,
-    }
-}
-
-fn backends() -> impl Iterator<Item = Backend> {
-    Backend::ALL.into_iter().filter(|b| b.is_built_in())
+    SubsurfaceOptions { single: true, cut_error: Some(0.1), ..rendering::options(estimator, cache_samples, 3) }
 }
 
 fn film<I: Integrator>(method: &I, scene: &Scene, backend: Backend, passes: Range<u32>) -> (Film, Tally) {

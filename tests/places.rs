@@ -11,8 +11,11 @@ use marmor::query::{self, Backend, Ray};
 use marmor::render::{self, Job};
 use marmor::scene::{Orders, Scene, SceneFile};
 use marmor::tally::WalkTally;
+use rendering::backends;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
+
+mod rendering;
 
 /// The slab of [van de Hulst 1980] that Monte Carlo programs are held against: light along the normal, 0.2 mm thick, n = 1.
 const VAN_DE_HULST: &str = "sigma_a = 1\nsigma_s = 9\ng = 0.75\neta = 1";
@@ -97,10 +100,6 @@ fn traced(scene: &Scene, place: Place, backend: Backend, paths: u64) -> [(f64, f
     let meant = scene.why_double.is_none() || mesh.precision == Precision::Double;
     assert!(!meant || (tally.losses.total() as f64) < 1e-4 * n, "{place:?}: {} paths lost", tally.losses.total());
     sums.map(|[sum, squares]| (sum / n, ((squares / n - (sum / n).powi(2)) / n).sqrt()))
-}
-
-fn backends() -> impl Iterator<Item = Backend> {
-    Backend::ALL.into_iter().filter(|b| b.is_built_in())
 }
 
 const FLAT: Place = Place { width: 20.0, thickness: 0.2, floor: 0.0, rotate: [0.0; 3] };

@@ -8,17 +8,11 @@ use marmor::optics::{FresnelMoments, reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
 use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
-use std::path::Path;
+use marmor::scene::{EntrySampling, Estimator, Scene};
+use rendering::{backends, load, options};
 use std::sync::atomic::AtomicBool;
 
-fn load(text: &str) -> Scene {
-    Scene::load(&SceneFile::parse(text, Path::new("test.toml")).unwrap()).unwrap()
-}
-
-fn backends() -> impl Iterator<Item = Backend> {
-    Backend::ALL.into_iter().filter(|b| b.is_built_in())
-}
+mod rendering;
 
 fn render<I: Integrator>(integrator: &I, scene: &Scene, backend: Backend, passes: u32, seed: u64) -> Image {
     let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
@@ -189,18 +183,7 @@ fn a_white_convex_body_vanishes_in_a_white_furnace() {
 const WAX: &str = "[material.wax]\ntype = \"translucent\"\nsigma_s_prime = [2, 3, 4]\nsigma_a = [0.8, 0.6, 0.4]\neta = 1.3\ng = 0\nmodel = \"standard\"\n";
 
 fn subsurface(seed: u64) -> SubsurfaceOptions {
-    SubsurfaceOptions {
-        single: false,
-        cache_samples: 4096,
-        estimator: Estimator::Notes,
-        cut_error: Some(0.03),
-        spread: Spread::Seen,
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        specular: false,
-        light_samples: 1,
-        seed,
-    }
+    SubsurfaceOptions { cut_error: Some(0.03), specular: false, ..options(Estimator::Notes, 4096, seed) }
 }
 
 /// Total of the standard dipole [JMLH01]: (α′/2)(e^{-σ_tr z_r} + e^{-σ_tr z_v}).

@@ -87,7 +87,7 @@ impl BetterDipole {
     }
 }
 
-impl Pair {
+impl Formula for Pair {
     #[inline(always)]
     fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32 {
         let s = self.decay;
@@ -113,18 +113,6 @@ columns!(Pair, Pairs { sigma_squared, length_log2, decay, decay_log2, z_virtual,
 
 impl Channel for Pair {
     type Columns = Pairs;
-}
-
-impl Formula for Pair {
-    #[inline(always)]
-    fn value(self, r2: f32) -> f32 {
-        self.eval::<false>(r2, 0.0)
-    }
-
-    #[inline(always)]
-    fn compensated(self, r2: f32, rate: f32) -> f32 {
-        self.eval::<true>(r2, rate)
-    }
 }
 
 impl DistanceOnly for BetterDipole {

@@ -202,21 +202,16 @@ impl Channel for Width {
 
 impl Formula for Width {
     #[inline(always)]
-    fn value(self, r2: f32) -> f32 {
+    fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32 {
         let (r, over_r) = self.outside_core(r2);
         // exp(-r/6d): its square may leave the range of f32 where the product with the scale does not.
         let root = exp2(-(0.5 * self.decay_log2 * r));
         let y = root * root;
-        self.scale * over_r * (1.0 + y * y) * root * root
-    }
-
-    #[inline(always)]
-    fn compensated(self, r2: f32, rate: f32) -> f32 {
-        let (r, over_r) = self.outside_core(r2);
-        let root = exp2(-(0.5 * self.decay_log2 * r));
-        let y = root * root;
-        // exp(rate r) (y + y³) with the gain in the exponent.
-        let gained = exp2(-(0.5 * left(self.decay_log2, rate * std::f32::consts::LOG2_E) * r));
+        let mut gained = root;
+        if COMPENSATED {
+            // exp(rate r) (y + y³) with the gain in the exponent.
+            gained = exp2(-(0.5 * left(self.decay_log2, rate * std::f32::consts::LOG2_E) * r));
+        }
         self.scale * over_r * (1.0 + y * y) * gained * gained
     }
 }

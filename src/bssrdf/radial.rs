@@ -29,11 +29,15 @@ pub trait Radial: Bssrdf {
 /// Implementations are straight-line f32 code, `#[inline(always)]`, with choices by value and no calls that do not
 /// inline: the loops over them are what vectorises.
 pub trait Formula: Copy + Send + Sync {
-    /// S_d [1/(unit² sr)] from r² ≥ 0 [unit²], which may be infinite.
-    fn value(self, r2: f32) -> f32;
+    /// S_d [1/(unit² sr)] from r² ≥ 0 [unit²], which may be infinite; if `COMPENSATED`, S_d exp(rate r), formed in the exponent:
+    /// `rate` [1/unit] is at most the channel's decay.
+    fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32;
 
-    /// S_d exp(rate r), formed in the exponent; `rate` [1/unit] is at most the channel's decay.
-    fn compensated(self, r2: f32, rate: f32) -> f32;
+    /// S_d alone.
+    #[inline(always)]
+    fn value(self, r2: f32) -> f32 {
+        self.eval::<false>(r2, 0.0)
+    }
 
     /// [`Self::value`] of a block; the same bits. For formulas that vectorise in parts only.
     #[inline(always)]
@@ -123,9 +127,9 @@ impl<M: DistanceOnly> Bssrdf for M {
         let k = self.channels();
         let r2 = entry.x.distance_squared(exit.x);
         if k.grey {
-            return Rgb::splat(k.each[0].compensated(r2, rate));
+            return Rgb::splat(k.each[0].eval::<true>(r2, rate));
         }
-        k.side_by_side(|c| c.compensated(r2, rate))
+        k.side_by_side(|c| c.eval::<true>(r2, rate))
     }
 
     #[inline]

@@ -159,7 +159,7 @@ impl Slab {
             rest = (rate * more * std::f32::consts::LOG2_E).min(250.0);
         }
         let faces = if through { &self.transmitted } else { &self.reflected };
-        let value = |face: &Face| times_exp2(face.compensated(r2, rate), rest);
+        let value = |face: &Face| times_exp2(face.eval::<true>(r2, rate), rest);
         if self.grey { Rgb::splat(value(&faces[0])) } else { Rgb::from_fn(|c| value(&faces[c])) }
     }
 
@@ -251,12 +251,6 @@ impl Face {
         let smooth = a + t * (b + t * (c + t * e));
         times_exp2(self.scale * smooth * ((i + self.decay) * (i * i)), -exponent)
     }
-
-    #[inline(always)]
-    fn eval<const COMPENSATED: bool>(&self, r2: f32, rate: f32) -> f32 {
-        let (piece, t, d, exponent) = self.locate::<COMPENSATED>(r2, rate);
-        self.finish(self.cubics[piece as usize], t, d, exponent)
-    }
 }
 
 /// Coefficients of the cubic through values at t = 0, 1/3, 2/3, 1.
@@ -271,13 +265,9 @@ fn through_thirds([a, b, c, d]: [f64; 4]) -> [f64; 4] {
 
 impl Formula for &Face {
     #[inline(always)]
-    fn value(self, r2: f32) -> f32 {
-        self.eval::<false>(r2, 0.0)
-    }
-
-    #[inline(always)]
-    fn compensated(self, r2: f32, rate: f32) -> f32 {
-        self.eval::<true>(r2, rate)
+    fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32 {
+        let (piece, t, d, exponent) = self.locate::<COMPENSATED>(r2, rate);
+        self.finish(self.cubics[piece as usize], t, d, exponent)
     }
 
     /// Vectorised but for the table, whose rows are fetched one by one between the halves.

@@ -76,7 +76,7 @@ pub(super) fn length_log2(k: &Reduced) -> f32 {
     if k.sigma_t_prime > 0.0 { finite(LOG2_E / k.sigma_t_prime) } else { 0.0 }
 }
 
-impl Pole {
+impl Formula for Pole {
     #[inline(always)]
     fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32 {
         let s = self.decay;
@@ -102,18 +102,6 @@ columns!(Pole, Poles { sigma_squared, length_log2, decay, decay_log2, z_virtual,
 
 impl Channel for Pole {
     type Columns = Poles;
-}
-
-impl Formula for Pole {
-    #[inline(always)]
-    fn value(self, r2: f32) -> f32 {
-        self.eval::<false>(r2, 0.0)
-    }
-
-    #[inline(always)]
-    fn compensated(self, r2: f32, rate: f32) -> f32 {
-        self.eval::<true>(r2, rate)
-    }
 }
 
 impl DistanceOnly for StandardDipole {

@@ -2,7 +2,7 @@
 
 use super::{Columns, Envelope, Node, Tree};
 use crate::bssrdf::{Bssrdf, Exit, Layout, Partition};
-use crate::math::{Vec3, Vec4, hash};
+use crate::math::{Aabb32, Vec3, Vec4, hash};
 use crate::tally::GatherTally;
 
 /// A node whose members spread over less than this share of its distance counts as a point when the sum is guessed.
@@ -127,9 +127,9 @@ impl Sums<'_> {
         let Some(&first) = order.first() else { return };
         let exits = self.exits;
         let at = |i: &u32| exits[*i as usize].x;
-        let (lower, upper) = order.iter().fold((at(&first), at(&first)), |(l, u), i| (l.min(at(i)), u.max(at(i))));
+        let bounds = Aabb32::around(order.iter().map(at));
         if order.len() <= GROUP {
-            let centre = 0.5 * (lower + upper);
+            let centre = bounds.centre();
             let radius = order.iter().map(|i| at(i).distance(centre)).fold(0.0, f32::max);
             self.collect(order, &Ball { centre, radius });
             if order.len() == 1 || self.scratch.picked.len() + self.scratch.far.len() <= LONG {
@@ -137,8 +137,7 @@ impl Sums<'_> {
                 return;
             }
         }
-        let size = upper - lower;
-        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { usize::from(size.y < size.z) + 1 };
+        let axis = bounds.longest_axis();
         let middle = order.len() / 2;
         order.select_nth_unstable_by(middle, |a, b| at(a)[axis].total_cmp(&at(b)[axis]).then(a.cmp(b)));
         let (left, right) = order.split_at_mut(middle);

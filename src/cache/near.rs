@@ -3,7 +3,7 @@
 
 use super::{CachedSample, Columns, Envelope, Filler, Shadow};
 use crate::bssrdf::{Exit, Layout, Partition};
-use crate::math::{DVec3, Frame, Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::tally::{Clock, Tally};
@@ -148,8 +148,8 @@ impl NearField {
         let mut picked = Vec::new();
         for (points, sums) in points.chunks(GROUP).zip(sums.chunks_mut(GROUP)) {
             let middle = |point: &GatherPoint| {
-                let frame = Frame::about(point.exit.n);
-                Middle { x: point.place, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame.to_world(a)) }
+                let frame = frame(point.exit.n);
+                Middle { x: point.place, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame * a) }
             };
             let middles: Vec<Middle> = points.iter().map(middle).collect();
             let candidates = self.along(filler, self.lines(&middles, points), tally);

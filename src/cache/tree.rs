@@ -1,7 +1,7 @@
 //! A binary tree over the samples of one pass, split at medians, in the order in which it is walked.
 
 use super::Columns;
-use crate::math::{Vec3, Vec4};
+use crate::math::{Aabb, Aabb32, Vec3, Vec4};
 
 /// Samples of a leaf, but for the last.
 pub const LEAF: usize = 8;
@@ -118,12 +118,12 @@ impl Tree {
                 own.join(&moments[right]);
             }
             moments[at] = own;
-            let centre = if own.mass > 0.0 { own.first.map(|v| v / own.mass) } else { own.middle() };
+            let centre = if own.mass > 0.0 { own.first.map(|v| v / own.mass) } else { own.bounds.centre().to_array() };
             node.centre = Vec3::from_array(centre.map(|v| v as f32));
             let variance: f64 = (0..3).map(|k| own.second[k] - own.mass * centre[k] * centre[k]).sum();
             node.spread = if own.mass > 0.0 { (variance / own.mass).max(0.0).sqrt() as f32 } else { 0.0 };
             // Of the box: cheap, and at most √3 too far.
-            let corner = |k: usize| (own.upper[k] - centre[k]).max(centre[k] - own.lower[k]);
+            let corner = |k: usize| (own.bounds.upper[k] - centre[k]).max(centre[k] - own.bounds.lower[k]);
             node.reach = (0..3).map(|k| corner(k).powi(2)).sum::<f64>().sqrt() as f32;
             let [r, g, b] = own.weight.map(|w| w as f32);
             node.weight = Vec4::new(r, g, b, 0.0);
@@ -169,13 +169,7 @@ fn split(points: &mut [(Vec3, u32)], nodes: &mut [Node], at: u32, first: u32) {
     if points.len() <= LEAF {
         return;
     }
-    let (mut lower, mut upper) = (points[0].0, points[0].0);
-    for (p, _) in points.iter() {
-        lower = lower.min(*p);
-        upper = upper.max(*p);
-    }
-    let size = upper - lower;
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { usize::from(size.y < size.z) + 1 };
+    let axis = Aabb32::around(points.iter().map(|p| p.0)).longest_axis();
     // Leaves are full, but for the last.
     let middle = points.len().div_ceil(LEAF).div_ceil(2) * LEAF;
     points.select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
@@ -199,8 +193,7 @@ struct Moments {
     mass: f64,
     first: [f64; 3],
     second: [f64; 3],
-    lower: [f64; 3],
-    upper: [f64; 3],
+    bounds: Aabb,
     weight: [f64; 3],
     /// Σ weight² / mass.
     squares: [f64; 3],
@@ -209,20 +202,18 @@ struct Moments {
 impl Default for Moments {
     fn default() -> Self {
         let zero = [0.0; 3];
-        let (lower, upper) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        Self { mass: 0.0, first: zero, second: zero, lower, upper, weight: zero, squares: zero }
+        Self { mass: 0.0, first: zero, second: zero, bounds: Aabb::EMPTY, weight: zero, squares: zero }
     }
 }
 
 impl Moments {
     fn take(&mut self, point: Vec3, weight: [f32; 3], mass: f64) {
         self.mass += mass;
+        self.bounds.grow(point.as_dvec3());
         for k in 0..3 {
             let x = f64::from(point[k]);
             self.first[k] += mass * x;
             self.second[k] += mass * x * x;
-            self.lower[k] = self.lower[k].min(x);
-            self.upper[k] = self.upper[k].max(x);
             self.weight[k] += f64::from(weight[k]);
             if mass > 0.0 {
                 self.squares[k] += f64::from(weight[k]).powi(2) / mass;
@@ -232,11 +223,10 @@ impl Moments {
 
     fn join(&mut self, other: &Self) {
         self.mass += other.mass;
+        self.bounds = self.bounds.join(other.bounds);
         for k in 0..3 {
             self.first[k] += other.first[k];
             self.second[k] += other.second[k];
-            self.lower[k] = self.lower[k].min(other.lower[k]);
-            self.upper[k] = self.upper[k].max(other.upper[k]);
             self.weight[k] += other.weight[k];
             self.squares[k] += other.squares[k];
         }
@@ -245,9 +235,5 @@ impl Moments {
     /// Members are drawn with probability mass / Σ mass and stand for weight · Σ mass / mass.
     fn uneven(&self, c: usize) -> f64 {
         (self.mass * self.squares[c] - self.weight[c] * self.weight[c]).max(0.0).sqrt()
-    }
-
-    fn middle(&self) -> [f64; 3] {
-        std::array::from_fn(|k| 0.5 * (self.lower[k] + self.upper[k]))
     }
 }

@@ -217,11 +217,12 @@ impl Extent {
     fn new(scene: &Scene, object: &Object) -> Self {
         let mesh = &object.mesh;
         let area = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
-        let (lo, hi) = mesh.bounds().unwrap_or_default();
+        let bounds = mesh.bounds().unwrap_or_default();
         // Coordinates keep what rounding about the scene's centre leaves of them.
-        let least = 1e-6 * (hi - lo).max_element().max(scene.centre.abs().max_element());
+        let least = 1e-6 * bounds.extent().max_element().max(scene.centre.abs().max_element());
         let place = |v: f64| if v.abs() < least { 0.0 } else { v };
-        Self { area, size: (hi - lo).to_array(), bounds: [lo, hi].map(|p| (p + scene.centre).to_array().map(place)) }
+        let corners = [bounds.lower, bounds.upper].map(|p| (p + scene.centre).to_array().map(place));
+        Self { area, size: bounds.extent().to_array(), bounds: corners }
     }
 }
 

@@ -27,12 +27,12 @@ pub struct AreaSample {
 impl AreaTable {
     /// The table of a whole mesh; triangles without area are never picked. `None` if none has area.
     pub fn new(mesh: &Mesh) -> Option<Self> {
-        let (lo, hi) = mesh.bounds()?;
+        let bounds = mesh.bounds()?;
         let mut order: Vec<(u64, u32)> = (0..mesh.triangles.len() as u32)
             .filter(|&t| mesh.area(t) > 0.0)
             .map(|t| {
                 let [a, b, c] = mesh.corners(t);
-                (morton_code((a + b + c) / 3.0, lo, hi), t)
+                (morton_code((a + b + c) / 3.0, &bounds), t)
             })
             .collect();
         if order.is_empty() {
@@ -48,7 +48,7 @@ impl AreaTable {
                 total
             })
             .collect();
-        Some(Self { triangles, cumulative, centre: 0.5 * lo + 0.5 * hi })
+        Some(Self { triangles, cumulative, centre: bounds.centre() })
     }
 
     /// Area of the mesh [unit²].

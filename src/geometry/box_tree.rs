@@ -1,6 +1,6 @@
 //! Boxes around faces, in a tree: which faces of two meshes, or of one, may meet.
 
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb, Aabb32, DVec3, Vec3};
 
 /// Faces in one leaf.
 const LEAF: usize = 2;
@@ -10,7 +10,7 @@ const TASKS: usize = 256;
 /// A balanced tree over a list of boxes in the order of a space-filling curve: node k has the children 2k and 2k + 1, and
 /// node 1 holds all. 24 bytes a node, as many nodes as faces.
 pub(super) struct BoxTree {
-    boxes: Vec<[Vec3; 2]>,
+    boxes: Vec<Aabb32>,
     /// The first leaf: a power of two.
     leaves: usize,
     items: usize,
@@ -21,21 +21,20 @@ pub(super) type NodePair = (u32, u32);
 
 impl BoxTree {
     /// Around `count` boxes.
-    pub(super) fn new(count: usize, bounds: impl Fn(usize) -> [DVec3; 2]) -> Self {
+    pub(super) fn new(count: usize, bounds: impl Fn(usize) -> Aabb) -> Self {
         let leaves = count.div_ceil(LEAF).next_power_of_two();
-        let empty = [Vec3::INFINITY, Vec3::NEG_INFINITY];
-        let mut boxes = vec![empty; 2 * leaves];
+        let mut boxes = vec![Aabb32::EMPTY; 2 * leaves];
         for item in 0..count {
-            let [lo, hi] = bounds(item);
+            let Aabb { lower, upper } = bounds(item);
             let around = &mut boxes[leaves + item / LEAF];
             // Outwards to the next numbers of single precision.
-            let down = Vec3::from_array(lo.to_array().map(|x| (x as f32).next_down()));
-            let up = Vec3::from_array(hi.to_array().map(|x| (x as f32).next_up()));
-            *around = [around[0].min(down), around[1].max(up)];
+            *around = around.join(Aabb32 {
+                lower: Vec3::from_array(lower.to_array().map(|x| (x as f32).next_down())),
+                upper: Vec3::from_array(upper.to_array().map(|x| (x as f32).next_up())),
+            });
         }
         for k in (1..leaves).rev() {
-            let [a, b] = [boxes[2 * k], boxes[2 * k + 1]];
-            boxes[k] = [a[0].min(b[0]), a[1].max(b[1])];
+            boxes[k] = boxes[2 * k].join(boxes[2 * k + 1]);
         }
         Self { boxes, leaves, items: count }
     }
@@ -47,9 +46,7 @@ impl BoxTree {
     }
 
     fn near(&self, node: u32, other: &Self, other_node: u32, gap: f32) -> bool {
-        let ([lo, hi], [other_lo, other_hi]) = (self.boxes[node as usize], other.boxes[other_node as usize]);
-        let gap = Vec3::splat(gap);
-        lo.cmple(other_hi + gap).all() && other_lo.cmple(hi + gap).all()
+        self.boxes[node as usize].is_near(&other.boxes[other_node as usize], gap)
     }
 
     /// The pairs of children of a pair of nodes of which one has some, whose boxes are within `gap` [unit] of each other.
@@ -63,8 +60,8 @@ impl BoxTree {
             return;
         }
         let size = |tree: &Self, node: u32| {
-            let [lo, hi] = tree.boxes[node as usize];
-            if (node as usize) < tree.leaves { (hi - lo).max_element() } else { f32::NEG_INFINITY }
+            let edges = tree.boxes[node as usize].extent();
+            if (node as usize) < tree.leaves { edges.max_element() } else { f32::NEG_INFINITY }
         };
         let pairs =
             if size(self, a) >= size(other, b) { [(2 * a, b), (2 * a + 1, b)] } else { [(a, 2 * b), (a, 2 * b + 1)] };
@@ -118,8 +115,8 @@ impl BoxTree {
     pub(super) fn along(&self, from: DVec3, to: DVec3, mut each: impl FnMut(u32)) {
         let mut stack = vec![1_u32];
         while let Some(node) = stack.pop() {
-            let [lo, hi] = self.boxes[node as usize].map(|p| p.as_dvec3());
-            if self.items == 0 || lo.x > hi.x || !meets(from, to, lo, hi) {
+            let around = &self.boxes[node as usize];
+            if self.items == 0 || around.is_empty() || !meets(from, to, around) {
                 continue;
             }
             match self.faces(node) {
@@ -131,8 +128,9 @@ impl BoxTree {
 }
 
 /// Whether a segment may meet a box: by the projections on the axes of the box and across the segment.
-fn meets(from: DVec3, to: DVec3, lo: DVec3, hi: DVec3) -> bool {
-    let (centre, half) = (0.5 * (lo + hi), 0.5 * (hi - lo));
+fn meets(from: DVec3, to: DVec3, around: &Aabb32) -> bool {
+    let around = Aabb { lower: around.lower.as_dvec3(), upper: around.upper.as_dvec3() };
+    let (centre, half) = (around.centre(), 0.5 * around.extent());
     let (middle, reach) = (0.5 * (from + to) - centre, 0.5 * (to - from));
     let slack = 1e-12 * (middle.abs() + half).max_element();
     if (middle.abs() - half - reach.abs()).max_element() > slack {

@@ -1,7 +1,7 @@
 //! How far away the nearest surface is at least, from a table: a step shorter than that needs no ray.
 
 use super::Mesh;
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb, Aabb32, DVec3, Vec3};
 
 /// Lower bounds of the distance to a set of triangles, for the points of a box cut into cubes. One byte a cube.
 pub struct Clearance {
@@ -20,12 +20,12 @@ pub struct Clearance {
 const FARTHEST: f32 = 63.0;
 
 impl Clearance {
-    /// For the box `lo`..`hi` [unit], its longest side cut into `cells`, and all triangles of `meshes`.
-    pub fn new<'a>(meshes: impl IntoIterator<Item = &'a Mesh>, lo: DVec3, hi: DVec3, cells: u32) -> Self {
-        let side = (hi - lo).max_element();
+    /// For the box `bounds` [unit], its longest side cut into `cells`, and all triangles of `meshes`.
+    pub fn new<'a>(meshes: impl IntoIterator<Item = &'a Mesh>, bounds: Aabb, cells: u32) -> Self {
+        let side = bounds.extent().max_element();
         // A little larger than the box, so that rounding puts no point of it outside.
         let margin = DVec3::splat(1e-4 * side + f64::from(f32::MIN_POSITIVE));
-        let (lo, hi) = (lo - margin, hi + margin);
+        let (lo, hi) = (bounds.lower - margin, bounds.upper + margin);
         let extent = (hi - lo).as_vec3();
         let edge = extent.max_element() / cells as f32;
         let size = (extent / edge).to_array().map(|n| (n.ceil() as usize).clamp(1, cells as usize));
@@ -61,7 +61,7 @@ impl Clearance {
     /// nearest neighbour of the other.
     fn mark(&self, corners: [DVec3; 3], squares: &mut [f32]) {
         let [a, b, c] = corners.map(|p| (p - self.lo).as_vec3() / self.edge);
-        let (least, most) = (a.min(b).min(c), a.max(b).max(c));
+        let Aabb32 { lower: least, upper: most } = Aabb32::around([a, b, c]);
         let normal = (b - a).cross(c - a).normalize_or_zero();
         // Half the extent of three cubes along the normal, and a little for rounding.
         let reach = 1.5 * normal.abs().element_sum() + 1e-3;
@@ -148,8 +148,7 @@ mod tests {
     fn bounds_are_below_the_distance_and_not_far_below() {
         let radius = 3.0;
         let mesh = sphere(DVec3::ZERO, f64::from(radius), 64, 128).recentred(DVec3::ZERO);
-        let (lo, hi) = mesh.bounds().unwrap();
-        let table = Clearance::new([&mesh], lo, hi, 64);
+        let table = Clearance::new([&mesh], mesh.bounds().unwrap(), 64);
         let (mut sum, mut ideal) = (0.0, 0.0);
         for i in 0..20_000_u64 {
             let u = |d: u64| 2.0 * unit_f32((hash(3 * i + d + 1) >> 32) as u32) - 1.0;
@@ -166,11 +165,11 @@ mod tests {
     fn large_slanted_triangles_block_their_own_cubes_only_and_outside_is_negative() {
         let corner = [DVec3::new(-10.0, 0.0, 0.0), DVec3::new(10.0, 0.0, 20.0), DVec3::new(-10.0, 20.0, 20.0)];
         let mesh = Mesh { positions: corner.to_vec(), triangles: vec![[0, 1, 2]], ..Mesh::default() };
-        let table = Clearance::new([&mesh], DVec3::splat(-10.0), DVec3::splat(20.0), 60);
+        let table = Clearance::new([&mesh], Aabb { lower: DVec3::splat(-10.0), upper: DVec3::splat(20.0) }, 60);
         assert_eq!(table.at(DVec3::new(-3.0, 6.0, 13.0)), 0.0);
         assert!(table.at(DVec3::new(15.0, 15.0, -5.0)) > 5.0);
         assert!(table.at(DVec3::splat(21.0)) < 0.0);
-        let empty = Clearance::new([], DVec3::ZERO, DVec3::ONE, 10);
+        let empty = Clearance::new([], Aabb { lower: DVec3::ZERO, upper: DVec3::ONE }, 10);
         assert!(empty.at(DVec3::splat(0.5)) > 5.0);
     }
 }

@@ -3,7 +3,7 @@
 //! Everything is decided up to a length, the gap that rays need between two surfaces. f64 is exact far below it.
 
 use super::box_tree::NodePair;
-use super::solid::{Face, Solid, bounds};
+use super::solid::{Face, Solid};
 use crate::math::{DVec2, DVec3};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -104,9 +104,7 @@ pub fn meeting(a: &Solid, b: &Solid, gap: f64, seek: Seek, major: impl Fn([u32; 
 /// How two faces meet.
 fn meet((a, i): (&Solid, u32), (b, j): (&Solid, u32), gap: f64, seek: Seek) -> Option<(Kind, DVec3)> {
     let (one, two) = (&a.faces[i as usize], &b.faces[j as usize]);
-    let ([lo, hi], [other_lo, other_hi]) = (bounds(&one.corners), bounds(&two.corners));
-    let reach = DVec3::splat(gap);
-    if lo.cmpgt(other_hi + reach).any() || other_lo.cmpgt(hi + reach).any() {
+    if !one.bounds().is_near(&two.bounds(), gap) {
         return None;
     }
     let (n, m) = (one.scaled_normal(), two.scaled_normal());
@@ -367,6 +365,7 @@ mod tests {
     #[test]
     fn rounding_hides_no_contact() {
         let turn = glam::DMat3::from_euler(glam::EulerRot::XYZ, 0.3, 1.1, -0.7);
+        let turn = glam::DAffine3::from_mat3_translation(turn, DVec3::new(0.3, 0.2, -0.1));
         for (other, expected) in [
             (cube(2.0, 0.3, 0.4, 2), "touching"),
             (cube(2.00001, 0.3, 0.4, 2), "apart"),
@@ -374,7 +373,7 @@ mod tests {
             (cube(0.0, 0.0, 0.0, 2), "crossing"),
             (cube(1.99, 0.0, 0.0, 2), "crossing"),
         ] {
-            let placed = |mesh: &ObjMesh| mesh.clone().placed(turn, DVec3::new(0.3, 0.2, -0.1));
+            let placed = |mesh: &ObjMesh| mesh.clone().placed(turn);
             assert_eq!(kind(&placed(&cube(0.0, 0.0, 0.0, 1)), &placed(&other)), expected);
         }
     }

@@ -3,7 +3,7 @@
 
 use super::weld::{Seam, moved_to, seam};
 use super::{Mesh, ObjMesh};
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 use crate::words::counted;
 use rayon::slice::ParallelSliceMut as _;
 use serde::Serialize;
@@ -242,16 +242,15 @@ impl Faces {
     /// What welding the `open` edges would close.
     fn seam(&self, open: &[[u32; 2]], point: &impl Fn(u32) -> DVec3) -> Option<(Seam, HashMap<u32, u32>)> {
         let kept = || self.kept.iter().map(|&t| self.corners[t as usize]);
-        let first = point(*open.first()?.first()?);
+        open.first()?;
         let corners = kept().flatten().map(point);
-        let (lo, hi) = corners.fold((first, first), |(lo, hi), p| (lo.min(p), hi.max(p)));
         let collapses = |moved: &HashMap<u32, u32>| {
             kept().any(|t| {
                 let [a, b, c] = t.map(|corner| moved_to(moved, corner));
                 a == b || b == c || c == a
             })
         };
-        seam(open, collapses, point, (hi - lo).length())
+        seam(open, collapses, point, Aabb::around(corners).extent().length())
     }
 
     /// For each triangle whether its face has to be turned.
@@ -279,19 +278,12 @@ impl Faces {
             if std::mem::replace(&mut seen[start as usize], true) {
                 continue;
             }
-            let mut part = Part {
-                triangles: vec![start],
-                closed: true,
-                lower: point(self.corners[start as usize][0]),
-                upper: point(self.corners[start as usize][0]),
-            };
+            let mut part = Part { triangles: vec![start], closed: true, bounds: Aabb::EMPTY };
             let mut next = 0;
             while let Some(&t) = part.triangles.get(next) {
                 next += 1;
                 part.closed &= !rim[t as usize];
-                for corner in self.corners[t as usize] {
-                    (part.lower, part.upper) = (part.lower.min(point(corner)), part.upper.max(point(corner)));
-                }
+                part.bounds = part.bounds.join(Aabb::around(self.corners[t as usize].map(point)));
                 for (other, disagrees) in neighbours[t as usize] {
                     if other != NONE && !std::mem::replace(&mut seen[other as usize], true) {
                         turn[other as usize] = turn[t as usize] ^ disagrees;
@@ -302,9 +294,9 @@ impl Faces {
             parts.push(part);
         }
         let inside = |part: &Part| {
-            parts
-                .iter()
-                .any(|other| other.closed && other.lower.cmplt(part.lower).all() && other.upper.cmpgt(part.upper).all())
+            let Aabb { lower, upper } = part.bounds;
+            let around = |b: Aabb| b.lower.cmplt(lower).all() && b.upper.cmpgt(upper).all();
+            parts.iter().any(|other| other.closed && around(other.bounds))
         };
         for part in &parts {
             let turned = part.triangles.iter().filter(|&&t| turn[t as usize]).count();
@@ -330,8 +322,7 @@ impl Faces {
 struct Part {
     triangles: Vec<u32>,
     closed: bool,
-    lower: DVec3,
-    upper: DVec3,
+    bounds: Aabb,
 }
 
 #[cfg(test)]

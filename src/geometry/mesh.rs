@@ -1,6 +1,6 @@
 //! A mesh of triangles, and the point of a surface that a ray or a sampler found.
 
-use crate::math::{DVec3, Vec3, hash_combine};
+use crate::math::{Aabb, DVec3, Vec3, hash_combine};
 
 /// Triangles over shared vertices, in world space relative to the scene's centre.
 #[derive(Clone, Debug, Default)]
@@ -144,10 +144,9 @@ impl Mesh {
         state
     }
 
-    /// Smallest and largest corner of the box around all vertices [unit]; `None` without vertices.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let first = *self.positions.first()?;
-        Some(self.positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p))))
+    /// The box around all vertices [unit]; `None` without vertices.
+    pub fn bounds(&self) -> Option<Aabb> {
+        (!self.positions.is_empty()).then(|| Aabb::around(self.positions.iter().copied()))
     }
 }
 

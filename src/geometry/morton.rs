@@ -1,15 +1,15 @@
 //! Order along a space-filling curve: neighbours in the list are neighbours in space.
 
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 
-/// 63-bit Morton code of `p` inside the box `lo`..`hi`, 21 bits an axis.
-pub fn morton_code(p: DVec3, lo: DVec3, hi: DVec3) -> u64 {
-    let extent = (hi - lo).max_element();
+/// 63-bit Morton code of `p` inside the box, 21 bits an axis.
+pub fn morton_code(p: DVec3, bounds: &Aabb) -> u64 {
+    let extent = bounds.extent().max_element();
     let cells = f64::from(1_u32 << 21) - 1.0;
     let cell = |offset: f64| {
         if extent > 0.0 { (offset / extent * cells) as u64 } else { 0 }
     };
-    let q = p - lo;
+    let q = p - bounds.lower;
     spread(cell(q.x)) | spread(cell(q.y)) << 1 | spread(cell(q.z)) << 2
 }
 
@@ -30,9 +30,10 @@ mod tests {
     #[test]
     fn bits_interleave() {
         assert_eq!(spread(0b101), 0b1_000_001);
+        let unit = Aabb { lower: DVec3::ZERO, upper: DVec3::ONE };
         let one = 1.0 / (f64::from(2_u16).powi(21) - 1.0);
-        assert_eq!(morton_code(DVec3::ZERO, DVec3::ZERO, DVec3::ONE), 0);
-        assert_eq!(morton_code(DVec3::new(0.0, one * 1.5, 0.0), DVec3::ZERO, DVec3::ONE), 0b010);
-        assert_eq!(morton_code(DVec3::ONE, DVec3::ZERO, DVec3::ONE), (1 << 63) - 1);
+        assert_eq!(morton_code(DVec3::ZERO, &unit), 0);
+        assert_eq!(morton_code(DVec3::new(0.0, one * 1.5, 0.0), &unit), 0b010);
+        assert_eq!(morton_code(DVec3::ONE, &unit), (1 << 63) - 1);
     }
 }

@@ -1,11 +1,10 @@
 //! A mesh in f64 as it is typed or made, on its way into a scene: placed, turned inside out, given smooth normals,
 //! moved to the scene's centre.
 
-use glam::DMat3;
 use std::collections::HashMap;
 
 use super::{Mesh, Normals};
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb, DAffine3, DVec3, Vec3};
 
 /// What an OBJ file or a shape holds, before any transform.
 #[derive(Clone, Debug, Default)]
@@ -30,10 +29,9 @@ pub struct ObjNormals {
 }
 
 impl ObjMesh {
-    /// Smallest and largest corner of the box around all vertices; `None` without vertices.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let first = *self.positions.first()?;
-        Some(self.positions.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p))))
+    /// The box around all vertices; `None` without vertices.
+    pub fn bounds(&self) -> Option<Aabb> {
+        (!self.positions.is_empty()).then(|| Aabb::around(self.positions.iter().copied()))
     }
 
     /// Triangles that lack normals while others have them.
@@ -41,12 +39,13 @@ impl ObjMesh {
         self.normals.as_ref().map_or(0, |n| n.triangles.iter().filter(|t| t.is_none()).count())
     }
 
-    /// Applies x -> `linear` x + `translate`. A mirroring map also turns the triangles' winding, so that the outside
-    /// stays outside; normals follow the inverse transpose. `linear` must have an inverse.
+    /// Applies `transform`, which must have an inverse. A mirroring map also turns the triangles' winding, so that the outside
+    /// stays outside; normals follow the inverse transpose.
     #[must_use]
-    pub fn placed(mut self, linear: DMat3, translate: DVec3) -> Self {
+    pub fn placed(mut self, transform: DAffine3) -> Self {
+        let linear = transform.matrix3;
         for p in &mut self.positions {
-            *p = linear * *p + translate;
+            *p = transform.transform_point3(*p);
         }
         if let Some(normals) = &mut self.normals {
             let inverse_transpose = linear.inverse().transpose();

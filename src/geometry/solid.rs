@@ -4,7 +4,7 @@
 use super::box_tree::BoxTree;
 use super::doctor::welded;
 use super::{Mesh, morton_code};
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -23,6 +23,10 @@ impl Face {
         let [a, b, c] = self.corners;
         (b - a).cross(c - a)
     }
+
+    pub(super) fn bounds(&self) -> Aabb {
+        Aabb::around(self.corners)
+    }
 }
 
 /// Faces that hang together over edges.
@@ -34,8 +38,8 @@ pub struct Part {
     pub volume: f64,
     /// Area \[unit²\].
     pub area: f64,
-    /// Smallest and largest corner of its box [unit].
-    pub bounds: (DVec3, DVec3),
+    /// Its box [unit].
+    pub bounds: Aabb,
     /// Number of faces.
     pub faces: usize,
     /// Its largest face.
@@ -86,12 +90,12 @@ impl Solid {
         keys.par_sort_unstable();
         keys.dedup_by_key(|k| k.0);
         let repeated = all - keys.len();
-        let (lo, hi) = mesh.bounds().unwrap_or_default();
+        let bounds = mesh.bounds().unwrap_or_default();
         let mut order: Vec<(u64, u32)> = keys
             .par_iter()
             .map(|&(_, t)| {
                 let [a, b, c] = mesh.corners(t);
-                (morton_code(((a + b + c) / 3.0).clamp(lo, hi), lo, hi), t)
+                (morton_code(((a + b + c) / 3.0).clamp(bounds.lower, bounds.upper), &bounds), t)
             })
             .collect();
         drop(keys);
@@ -106,7 +110,7 @@ impl Solid {
         edges.extend((0_u32..).zip(&faces).flat_map(|(i, f)| keyed(f.places, i)));
         edges.par_sort_unstable();
         let parts = label(&mut faces, &edges);
-        let tree = BoxTree::new(faces.len(), |i| bounds(&faces[i].corners));
+        let tree = BoxTree::new(faces.len(), |i| faces[i].bounds());
         let seams = Seams { repeated, ..Seams::default() };
         let mut solid = Self { faces, tree, edges, parts: Vec::new(), seams };
         solid.measure(parts);
@@ -139,19 +143,12 @@ impl Solid {
     }
 
     /// Box of the whole [unit].
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.parts.iter().map(|p| p.bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    pub fn bounds(&self) -> Option<Aabb> {
+        self.parts.iter().map(|p| p.bounds).reduce(Aabb::join)
     }
 
     fn measure(&mut self, count: usize) {
-        let none = Part {
-            closed: true,
-            volume: 0.0,
-            area: 0.0,
-            bounds: (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            faces: 0,
-            largest: 0,
-        };
+        let none = Part { closed: true, volume: 0.0, area: 0.0, bounds: Aabb::EMPTY, faces: 0, largest: 0 };
         let mut parts = vec![none; count];
         let (mut origins, mut most) = (vec![None; count], vec![-1.0; count]);
         for (i, face) in (0_u32..).zip(&self.faces) {
@@ -163,8 +160,7 @@ impl Solid {
             part.volume += a.dot(b.cross(c)) / 6.0;
             part.area += area;
             part.faces += 1;
-            let [lo, hi] = bounds(&face.corners);
-            part.bounds = (part.bounds.0.min(lo), part.bounds.1.max(hi));
+            part.bounds = part.bounds.join(face.bounds());
             if area > most[p] {
                 (most[p], part.largest) = (area, i);
             }
@@ -215,11 +211,6 @@ fn rim_area(mut rims: HashMap<u32, Vec<(u32, DVec3)>>) -> f64 {
         }
     }
     area
-}
-
-pub(super) fn bounds(corners: &[DVec3; 3]) -> [DVec3; 2] {
-    let [a, b, c] = *corners;
-    [a.min(b).min(c), a.max(b).max(c)]
 }
 
 /// Lower place, higher place and direction: edges between the same places sort together. Numbers stay below 2^31.

@@ -18,8 +18,8 @@ impl Solid {
     /// to tell its sides is given up for another one, so that no answer depends on rounding. Open parts have no sides: for
     /// them it is the whole number nearest to the solid angle over 4π [VOS83].
     pub fn winding(&self, p: DVec3, counts: impl Fn(u32) -> bool) -> Option<i32> {
-        let (lo, hi) = self.bounds()?;
-        if p.cmplt(lo).any() || p.cmpgt(hi).any() {
+        let bounds = self.bounds()?;
+        if !bounds.contains(p) {
             return Some(0);
         }
         let wanted = |face: &Face| counts(face.part);
@@ -27,7 +27,7 @@ impl Solid {
             let angle: f64 = self.faces.iter().filter(|f| wanted(f)).map(|f| solid_angle(f, p)).sum();
             return Some((angle / (4.0 * std::f64::consts::PI)).round() as i32);
         }
-        let far = 4.0 * (hi - lo).length();
+        let far = 4.0 * bounds.extent().length();
         (0..TRIES).find_map(|i| self.crossings(p, p + direction(i) * far, |_, face| wanted(face)))
     }
 
@@ -51,8 +51,8 @@ impl Solid {
     /// some of them out.
     pub fn hidden_share(&self) -> f64 {
         let area: f64 = self.parts.iter().map(|p| p.area).sum();
-        let Some((lo, hi)) = self.bounds().filter(|_| area > 0.0) else { return 0.0 };
-        let far = 4.0 * (hi - lo).length();
+        let Some(bounds) = self.bounds().filter(|_| area > 0.0) else { return 0.0 };
+        let far = 4.0 * bounds.extent().length();
         let (mut below, mut next, mut probes) = (0.0, 0, Vec::with_capacity(PROBES));
         for (i, face) in (0_u32..).zip(&self.faces) {
             below += 0.5 * face.scaled_normal().length();

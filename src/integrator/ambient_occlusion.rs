@@ -1,7 +1,7 @@
 //! The share of the cosine-weighted hemisphere that is open.
 
 use super::{CameraRay, Integrator, Part, View, camera_hits};
-use crate::math::{Frame, Rgb};
+use crate::math::{Rgb, frame};
 use crate::query::Ray;
 use crate::sampling::Pairs;
 use crate::scene::Scene;
@@ -38,9 +38,9 @@ impl Integrator for AmbientOcclusion {
             }
             let mut probes = Vec::with_capacity(points.len() * per_hit);
             for (at, local) in points.iter().zip(pairs.cosine_hemisphere().chunks_exact(per_hit)) {
-                let frame = Frame::about(at.n);
+                let frame = frame(at.n);
                 probes.extend(local.iter().map(|&w| {
-                    let w = frame.to_world(w);
+                    let w = frame * w;
                     Ray { t_max: self.radius, ..Ray::new(at.leave(w), w) }
                 }));
             }

@@ -3,7 +3,7 @@
 use super::View;
 use crate::bssrdf::{ExpectedError, ModelName, ModelOptions, Place, Unmeasured, expected_error};
 use crate::geometry::SurfacePoint;
-use crate::math::{Frame, Vec3};
+use crate::math::{Vec3, frame};
 use crate::optics::{ChannelOptics, Medium};
 use crate::query::Ray;
 use crate::scene::{Scene, Translucent};
@@ -119,10 +119,10 @@ impl LocalShape {
     /// a circle as wide as the longest transport mean free path, or a quarter of `thickness`.
     pub fn curvature(&self, view: View<'_>, at: &SurfacePoint, thickness: f32) -> f32 {
         let radius = (self.longest_path() as f32).min(0.25 * thickness);
-        let frame = Frame::about(at.n);
+        let frame = frame(at.n);
         let height = |k: u32| {
             let (sin, cos) = (std::f32::consts::TAU * k as f32 / AROUND as f32).sin_cos();
-            let from = at.x + (frame.to_world(Vec3::new(cos, sin, 1.0)) * radius).as_dvec3();
+            let from = at.x + (frame * Vec3::new(cos, sin, 1.0) * radius).as_dvec3();
             let mut ray = Ray { t_max: 2.0 * radius, ..Ray::new(from, -at.n) };
             for _ in 0..MOST_CROSSED {
                 let Some(hit) = view.rays.closest(&ray) else { break };

@@ -2,7 +2,7 @@
 
 use super::{Arrival, CountedLight, LampPoint, Sky, SunDirection};
 use crate::geometry::{AreaTable, SurfacePoint};
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::math::{Aabb, Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::{Emission, Scene};
@@ -28,7 +28,7 @@ struct Emitter {
     two_sided: bool,
     /// Chance of a point per area [1/unit²]: the emitter's own chance over its area.
     pdf_area: f32,
-    bounds: (DVec3, DVec3),
+    bounds: Aabb,
 }
 
 impl Lights {
@@ -223,12 +223,12 @@ impl Lights {
     /// Share of directions that are better picked by the cosine for a body within `bounds`: half with an environment, none
     /// without, unless an emitter is nearer than it is wide: from there its points have densities that differ without
     /// bound.
-    pub fn cosine_share(&self, (lower, upper): (DVec3, DVec3)) -> f32 {
+    pub fn cosine_share(&self, bounds: Aabb) -> f32 {
         if self.has_environment() {
             return if self.has_emitters() { 0.5 } else { 1.0 };
         }
         let seen = |e: &Emitter| {
-            let gap = (e.bounds.0 - upper).max(lower - e.bounds.1).max(DVec3::ZERO).length() as f32;
+            let gap = e.bounds.distance(&bounds) as f32;
             let area = e.table.area() as f32;
             area / (area + PI * gap * gap)
         };

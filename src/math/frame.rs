@@ -1,35 +1,13 @@
 //! An orthonormal frame about a normal.
 
-use glam::Vec3;
+use glam::{Mat3, Vec3};
 
-/// Two unit tangents and a unit normal, right-handed: `tangent` x `bitangent` = `normal`.
-#[derive(Clone, Copy, Debug)]
-pub struct Frame {
-    tangent: Vec3,
-    bitangent: Vec3,
-    normal: Vec3,
-}
-
-impl Frame {
-    /// A frame whose third axis is the unit vector `normal`; free of branches and of singular directions
-    /// [Duff et al. 2017, listing 3].
-    #[inline]
-    pub fn about(normal: Vec3) -> Self {
-        let sign = 1.0_f32.copysign(normal.z);
-        let a = -1.0 / (sign + normal.z);
-        let b = normal.x * normal.y * a;
-        Self {
-            tangent: Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x),
-            bitangent: Vec3::new(b, sign + normal.y * normal.y * a, -normal.y),
-            normal,
-        }
-    }
-
-    /// The vector with coordinates `local` in this frame (z along the normal).
-    #[inline]
-    pub fn to_world(&self, local: Vec3) -> Vec3 {
-        self.tangent * local.x + self.bitangent * local.y + self.normal * local.z
-    }
+/// A right-handed orthonormal frame with the unit vector `normal` as its third axis: times a vector in its coordinates it is
+/// that vector in the world. Without branches and singular directions [Duff et al. 2017].
+#[inline]
+pub fn frame(normal: Vec3) -> Mat3 {
+    let (tangent, bitangent) = normal.any_orthonormal_pair();
+    Mat3::from_cols(tangent, bitangent, normal)
 }
 
 #[cfg(test)]
@@ -44,10 +22,9 @@ mod tests {
             normals.push(Vec3::new(0.3 * s(0), 0.5 * s(1), 1e-4 * s(2)).normalize());
         }
         for n in normals {
-            let f = Frame::about(n);
-            let (t, b) = (f.to_world(Vec3::X), f.to_world(Vec3::Y));
-            assert!((t.cross(b) - n).length() < 1e-6, "{n}");
-            assert!(t.dot(b).abs() < 1e-6 && (t.length() - 1.0).abs() < 1e-6, "{n}");
+            let f = frame(n);
+            assert!((f * f.transpose()).abs_diff_eq(Mat3::IDENTITY, 1e-6) && f.determinant() > 0.0, "{n}");
+            assert_eq!(f * Vec3::Z, n);
         }
     }
 }

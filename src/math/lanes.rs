@@ -2,9 +2,7 @@
 //! for each instruction set, as in `simd.rs`. Each lane does what scalar code does, without fused multiply-add: results are
 //! the same bits on every instruction set.
 
-#[cfg(target_arch = "x86_64")]
-use super::simd::with_avx2;
-use super::simd::{Kernel, Level};
+use super::simd::Level;
 use std::ops::{Add, Div, Mul, Sub};
 
 /// Work on lanes of eight, to be compiled for several instruction sets.
@@ -31,11 +29,11 @@ impl Lanes {
     /// `level`, or the widest below it that this machine has. Eight lanes are 256 bits: AVX-512 adds nothing.
     pub fn at(level: Level) -> Self {
         #[cfg(target_arch = "x86_64")]
-        if level != Level::Baseline && Level::best() != Level::Baseline {
-            return Self(Choice::Avx2(Avx2(())));
+        if let (Level::Avx2 | Level::Avx512, Some(simd)) = (level, Avx2::try_new()) {
+            return Self(Choice::Avx2(simd));
         }
         let _ = level;
-        Self(Choice::Baseline(Baseline))
+        Self(Choice::Baseline(Baseline::new()))
     }
 
     /// The instruction set that was chosen.
@@ -53,21 +51,22 @@ impl Lanes {
         match self.0 {
             Choice::Baseline(simd) => kernel.run(simd),
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Avx2` is made by `Lanes::at` alone, where the machine has the instruction set.
-            Choice::Avx2(simd) => unsafe { with_avx2(On { kernel, simd }) },
+            Choice::Avx2(simd) => simd.vectorize(On { kernel, simd }),
         }
     }
 }
 
+#[cfg(target_arch = "x86_64")]
 struct On<K, S> {
     kernel: K,
     simd: S,
 }
 
-impl<K: LaneKernel, S: Simd> Kernel for On<K, S> {
-    type Out = K::Out;
+#[cfg(target_arch = "x86_64")]
+impl<K: LaneKernel, S: Simd> pulp::NullaryFnOnce for On<K, S> {
+    type Output = K::Out;
     #[inline(always)]
-    fn run(self) -> K::Out {
+    fn call(self) -> K::Out {
         self.kernel.run(self.simd)
     }
 }
@@ -190,82 +189,122 @@ operator!(Sub, sub);
 operator!(Mul, mul);
 operator!(Div, div);
 
-/// What the target guarantees: two SSE vectors on x86-64.
 #[cfg(target_arch = "x86_64")]
-mod baseline {
-    use std::arch::x86_64::*;
+mod x86 {
+    use super::super::simd::sets::{Avx2, Sse2};
+    use std::arch::x86_64::{__m128, __m256, _CMP_LE_OQ, _CMP_LT_OQ};
 
-    /// SSE2, a part of x86-64.
+    /// Two SSE vectors.
     #[derive(Clone, Copy, Debug)]
-    pub struct Baseline;
+    pub struct Baseline(Sse2);
 
-    macro_rules! pairwise {
-        ($($name:ident = $of:ident;)*) => {
-            $(#[inline(always)]
-            fn $name(self, a: Self::Eight, b: Self::Eight) -> Self::Eight {
-                // SAFETY: every x86-64 has SSE2.
-                unsafe { [$of(a[0], b[0]), $of(a[1], b[1])] }
-            })*
+    impl Baseline {
+        pub fn new() -> Self {
+            Self(Sse2::try_new().expect("SSE2 is a part of x86-64"))
+        }
+    }
+
+    macro_rules! of_two {
+        ($($name:ident = $sse:ident, $avx:ident;)*) => {
+            impl super::Simd for Baseline {
+                type Eight = [__m128; 2];
+
+                #[inline(always)]
+                fn fill(self, value: f32) -> Self::Eight {
+                    [self.0.sse._mm_set1_ps(value); 2]
+                }
+
+                #[inline(always)]
+                fn load(self, from: &[f32; 8]) -> Self::Eight {
+                    pulp::cast(*from)
+                }
+
+                #[inline(always)]
+                fn store(self, v: Self::Eight) -> [f32; 8] {
+                    pulp::cast(v)
+                }
+
+                #[inline(always)]
+                fn abs(self, a: Self::Eight) -> Self::Eight {
+                    a.map(|a| self.0.sse._mm_andnot_ps(self.0.sse._mm_set1_ps(-0.0), a))
+                }
+
+                #[inline(always)]
+                fn lt(self, a: Self::Eight, b: Self::Eight) -> u32 {
+                    let sse = self.0.sse;
+                    let [low, high] = [0, 1].map(|i| sse._mm_movemask_ps(sse._mm_cmplt_ps(a[i], b[i])) as u32);
+                    low | high << 4
+                }
+
+                #[inline(always)]
+                fn le(self, a: Self::Eight, b: Self::Eight) -> u32 {
+                    let sse = self.0.sse;
+                    let [low, high] = [0, 1].map(|i| sse._mm_movemask_ps(sse._mm_cmple_ps(a[i], b[i])) as u32);
+                    low | high << 4
+                }
+
+                $(#[inline(always)]
+                fn $name(self, a: Self::Eight, b: Self::Eight) -> Self::Eight {
+                    [self.0.sse.$sse(a[0], b[0]), self.0.sse.$sse(a[1], b[1])]
+                })*
+            }
+
+            /// One AVX vector.
+            impl super::Simd for Avx2 {
+                type Eight = __m256;
+
+                #[inline(always)]
+                fn fill(self, value: f32) -> __m256 {
+                    self.avx._mm256_set1_ps(value)
+                }
+
+                #[inline(always)]
+                fn load(self, from: &[f32; 8]) -> __m256 {
+                    pulp::cast(*from)
+                }
+
+                #[inline(always)]
+                fn store(self, v: __m256) -> [f32; 8] {
+                    pulp::cast(v)
+                }
+
+                #[inline(always)]
+                fn abs(self, a: __m256) -> __m256 {
+                    self.avx._mm256_andnot_ps(self.avx._mm256_set1_ps(-0.0), a)
+                }
+
+                #[inline(always)]
+                fn lt(self, a: __m256, b: __m256) -> u32 {
+                    self.avx._mm256_movemask_ps(self.avx._mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as u32
+                }
+
+                #[inline(always)]
+                fn le(self, a: __m256, b: __m256) -> u32 {
+                    self.avx._mm256_movemask_ps(self.avx._mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32
+                }
+
+                $(#[inline(always)]
+                fn $name(self, a: __m256, b: __m256) -> __m256 {
+                    self.avx.$avx(a, b)
+                })*
+            }
         };
     }
 
-    #[allow(unused_unsafe)] // whether an intrinsic of the baseline is safe to call depends on the compiler's version
-    impl super::Simd for Baseline {
-        type Eight = [__m128; 2];
-
-        #[inline(always)]
-        fn fill(self, value: f32) -> Self::Eight {
-            // SAFETY: every x86-64 has SSE2.
-            unsafe { [_mm_set1_ps(value); 2] }
-        }
-
-        #[inline(always)]
-        fn load(self, from: &[f32; 8]) -> Self::Eight {
-            // SAFETY: eight numbers lie at `from`; the load needs no alignment.
-            unsafe { [_mm_loadu_ps(from.as_ptr()), _mm_loadu_ps(from[4..].as_ptr())] }
-        }
-
-        #[inline(always)]
-        fn store(self, v: Self::Eight) -> [f32; 8] {
-            let mut to = [0.0; 8];
-            // SAFETY: there is room for eight numbers at `to`; the store needs no alignment.
-            unsafe {
-                _mm_storeu_ps(to.as_mut_ptr(), v[0]);
-                _mm_storeu_ps(to[4..].as_mut_ptr(), v[1]);
-            }
-            to
-        }
-
-        pairwise! {
-            add = _mm_add_ps;
-            sub = _mm_sub_ps;
-            mul = _mm_mul_ps;
-            div = _mm_div_ps;
-            min = _mm_min_ps;
-            max = _mm_max_ps;
-        }
-
-        #[inline(always)]
-        fn abs(self, a: Self::Eight) -> Self::Eight {
-            // SAFETY: every x86-64 has SSE2.
-            unsafe { a.map(|a| _mm_andnot_ps(_mm_set1_ps(-0.0), a)) }
-        }
-
-        #[inline(always)]
-        fn lt(self, a: Self::Eight, b: Self::Eight) -> u32 {
-            // SAFETY: every x86-64 has SSE2.
-            let [low, high] = unsafe { [0, 1].map(|i| _mm_movemask_ps(_mm_cmplt_ps(a[i], b[i])) as u32) };
-            low | high << 4
-        }
-
-        #[inline(always)]
-        fn le(self, a: Self::Eight, b: Self::Eight) -> u32 {
-            // SAFETY: every x86-64 has SSE2.
-            let [low, high] = unsafe { [0, 1].map(|i| _mm_movemask_ps(_mm_cmple_ps(a[i], b[i])) as u32) };
-            low | high << 4
-        }
+    of_two! {
+        add = _mm_add_ps, _mm256_add_ps;
+        sub = _mm_sub_ps, _mm256_sub_ps;
+        mul = _mm_mul_ps, _mm256_mul_ps;
+        div = _mm_div_ps, _mm256_div_ps;
+        min = _mm_min_ps, _mm256_min_ps;
+        max = _mm_max_ps, _mm256_max_ps;
     }
 }
+
+#[cfg(target_arch = "x86_64")]
+use super::simd::sets::Avx2;
+#[cfg(target_arch = "x86_64")]
+use x86::Baseline;
 
 /// What the target guarantees: loops that the compiler vectorises.
 #[cfg(not(target_arch = "x86_64"))]
@@ -275,6 +314,12 @@ mod baseline {
     /// Plain Rust.
     #[derive(Clone, Copy, Debug)]
     pub struct Baseline;
+
+    impl Baseline {
+        pub fn new() -> Self {
+            Self
+        }
+    }
 
     impl super::Simd for Baseline {
         type Eight = [f32; 8];
@@ -341,81 +386,8 @@ mod baseline {
     }
 }
 
+#[cfg(not(target_arch = "x86_64"))]
 use baseline::Baseline;
-
-/// One AVX vector.
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use std::arch::x86_64::*;
-
-    /// Proof of AVX2.
-    #[derive(Clone, Copy, Debug)]
-    pub struct Avx2(pub(super) ());
-
-    macro_rules! of_two {
-        ($($name:ident = $of:ident;)*) => {
-            $(#[inline(always)]
-            fn $name(self, a: __m256, b: __m256) -> __m256 {
-                // SAFETY: `self` proves AVX2, which includes AVX.
-                unsafe { $of(a, b) }
-            })*
-        };
-    }
-
-    impl super::Simd for Avx2 {
-        type Eight = __m256;
-
-        #[inline(always)]
-        fn fill(self, value: f32) -> __m256 {
-            // SAFETY: `self` proves AVX2, which includes AVX.
-            unsafe { _mm256_set1_ps(value) }
-        }
-
-        #[inline(always)]
-        fn load(self, from: &[f32; 8]) -> __m256 {
-            // SAFETY: as in `fill`; eight numbers lie at `from`, and the load needs no alignment.
-            unsafe { _mm256_loadu_ps(from.as_ptr()) }
-        }
-
-        #[inline(always)]
-        fn store(self, v: __m256) -> [f32; 8] {
-            let mut to = [0.0; 8];
-            // SAFETY: as in `fill`; there is room for eight numbers at `to`, and the store needs no alignment.
-            unsafe { _mm256_storeu_ps(to.as_mut_ptr(), v) }
-            to
-        }
-
-        of_two! {
-            add = _mm256_add_ps;
-            sub = _mm256_sub_ps;
-            mul = _mm256_mul_ps;
-            div = _mm256_div_ps;
-            min = _mm256_min_ps;
-            max = _mm256_max_ps;
-        }
-
-        #[inline(always)]
-        fn abs(self, a: __m256) -> __m256 {
-            // SAFETY: as in `fill`.
-            unsafe { _mm256_andnot_ps(_mm256_set1_ps(-0.0), a) }
-        }
-
-        #[inline(always)]
-        fn lt(self, a: __m256, b: __m256) -> u32 {
-            // SAFETY: as in `fill`.
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as u32 }
-        }
-
-        #[inline(always)]
-        fn le(self, a: __m256, b: __m256) -> u32 {
-            // SAFETY: as in `fill`.
-            unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(a, b)) as u32 }
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-use avx2::Avx2;
 
 #[cfg(test)]
 mod tests {

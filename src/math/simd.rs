@@ -5,6 +5,9 @@
 //! No fused multiply-add, no reordering: each lane does what the scalar code does, so results are the same bits on
 //! every instruction set.
 
+#[cfg(target_arch = "x86_64")]
+use sets::{Avx2, Avx512};
+
 /// Work to be compiled for several instruction sets.
 pub trait Kernel {
     /// What the work yields.
@@ -30,11 +33,11 @@ impl Level {
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
-            // `std` looks once and remembers.
-            if std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512dq") {
+            // Looked for once and remembered.
+            if Avx512::is_available() {
                 return Self::Avx512;
             }
-            if std::is_x86_feature_detected!("avx2") {
+            if Avx2::is_available() {
                 return Self::Avx2;
             }
         }
@@ -43,15 +46,7 @@ impl Level {
 
     /// All that this machine has, the baseline first.
     pub fn available() -> Vec<Self> {
-        let best = Self::best();
-        let mut levels = vec![Self::Baseline];
-        if best != Self::Baseline {
-            levels.push(Self::Avx2);
-        }
-        if best == Self::Avx512 {
-            levels.push(Self::Avx512);
-        }
-        levels
+        [Self::Baseline, Self::Avx2, Self::Avx512].into_iter().filter(|level| *level <= Self::best()).collect()
     }
 }
 
@@ -65,31 +60,42 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Out {
 #[inline]
 pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Out {
     #[cfg(target_arch = "x86_64")]
-    {
-        let best = Level::best();
-        if level == Level::Avx512 && best == Level::Avx512 {
-            // SAFETY: `Level::best` has just found every feature that the function enables (AVX-512 implies AVX2).
-            return unsafe { with_avx512(kernel) };
-        }
-        if level != Level::Baseline && best != Level::Baseline {
-            // SAFETY: `Level::best` has just found AVX2, alone or under AVX-512.
-            return unsafe { with_avx2(kernel) };
-        }
+    match (level, Avx512::try_new(), Avx2::try_new()) {
+        (Level::Avx512, Some(simd), _) => return simd.vectorize(Call(kernel)),
+        (Level::Avx512 | Level::Avx2, _, Some(simd)) => return simd.vectorize(Call(kernel)),
+        _ => {}
     }
     let _ = level;
     kernel.run()
 }
 
+/// Proofs that the machine has an instruction set.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx512f,avx512dq")]
-fn with_avx512<K: Kernel>(kernel: K) -> K::Out {
-    kernel.run()
+pub(super) mod sets {
+    pulp::simd_type! {
+        /// Every x86-64 has it.
+        pub struct Sse2 { pub sse: "sse", pub sse2: "sse2" }
+
+        /// 256-bit vectors.
+        pub struct Avx2 { pub avx: "avx", pub avx2: "avx2" }
+
+        /// 512-bit vectors.
+        pub struct Avx512 { pub avx512f: "avx512f", pub avx512dq: "avx512dq" }
+    }
 }
 
+/// A kernel as `pulp` calls it: inlined, unlike a closure.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-pub(super) fn with_avx2<K: Kernel>(kernel: K) -> K::Out {
-    kernel.run()
+struct Call<K>(K);
+
+#[cfg(target_arch = "x86_64")]
+impl<K: Kernel> pulp::NullaryFnOnce for Call<K> {
+    type Output = K::Out;
+
+    #[inline(always)]
+    fn call(self) -> K::Out {
+        self.0.run()
+    }
 }
 
 #[cfg(test)]

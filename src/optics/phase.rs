@@ -38,7 +38,7 @@ impl HenyeyGreenstein {
         let cosine = self.sample_cosine(f64::from(u[0])) as f32;
         let sine = ((1.0 - cosine) * (1.0 + cosine)).max(0.0).sqrt();
         let (sin, cos) = (std::f32::consts::TAU * u[1]).sin_cos();
-        crate::math::Frame::about(w).to_world(Vec3::new(sine * cos, sine * sin, cosine))
+        crate::math::frame(w) * Vec3::new(sine * cos, sine * sin, cosine)
     }
 }
 

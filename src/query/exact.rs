@@ -4,7 +4,7 @@
 
 use super::{Hit, Ray, RayQuery};
 use crate::geometry::Mesh;
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 
 /// Meshes, copied into a tree in f64.
 pub struct Exact {
@@ -20,8 +20,7 @@ struct Triangle {
 
 /// A box. Leaves: `count` triangles from `first` on. Others, of `count` 0: the second child, the first being the next node.
 struct Node {
-    lower: DVec3,
-    upper: DVec3,
+    bounds: Aabb,
     first: u32,
     count: u32,
 }
@@ -133,9 +132,9 @@ impl RayQuery for Exact {
 
 /// Appends the node of `triangles`, which begin at number `offset`, and all below it.
 fn build(nodes: &mut Vec<Node>, triangles: &mut [Triangle], offset: u32, depth: usize) {
-    let (lower, upper) = triangles.iter().map(Triangle::bounds).reduce(union).unwrap_or_default();
+    let bounds = triangles.iter().map(Triangle::bounds).fold(Aabb::EMPTY, Aabb::join);
     let index = nodes.len();
-    nodes.push(Node { lower, upper, first: offset, count: triangles.len() as u32 });
+    nodes.push(Node { bounds, first: offset, count: triangles.len() as u32 });
     if triangles.len() <= LEAF {
         return;
     }
@@ -150,21 +149,23 @@ fn build(nodes: &mut Vec<Node>, triangles: &mut [Triangle], offset: u32, depth: 
 /// Parts the triangles where the surface area heuristic finds it cheapest along the longest side of the box of their middles;
 /// how many come first.
 fn cut(triangles: &mut [Triangle], depth: usize) -> usize {
-    let middles = triangles.iter().map(|t| (t.middle(), t.middle()));
-    let (lower, upper) = middles.reduce(union).unwrap_or_default();
-    let axis = (upper - lower).max_position();
-    let (start, width) = (lower[axis], upper[axis] - lower[axis]);
+    let middles = Aabb::around(triangles.iter().map(Triangle::middle));
+    let axis = middles.longest_axis();
+    let (start, width) = (middles.lower[axis], middles.extent()[axis]);
     if depth < STEEP_DEPTH && width > 0.0 {
         let bin = |t: &Triangle| (((t.middle()[axis] - start) / width * BINS as f64) as usize).min(BINS - 1);
-        let mut bins = [(0_usize, None::<(DVec3, DVec3)>); BINS];
+        let mut bins = [(0_usize, Aabb::EMPTY); BINS];
         for triangle in &*triangles {
             let (count, bounds) = &mut bins[bin(triangle)];
             *count += 1;
-            *bounds = Some(bounds.map_or(triangle.bounds(), |b| union(b, triangle.bounds())));
+            *bounds = bounds.join(triangle.bounds());
         }
-        let cost = |part: &[(usize, Option<(DVec3, DVec3)>)]| {
+        let cost = |part: &[(usize, Aabb)]| {
             let count: usize = part.iter().map(|b| b.0).sum();
-            let side = part.iter().filter_map(|b| b.1).reduce(union).map_or(DVec3::ZERO, |(lo, hi)| hi - lo);
+            if count == 0 {
+                return 0.0;
+            }
+            let side = part.iter().map(|b| b.1).fold(Aabb::EMPTY, Aabb::join).extent();
             count as f64 * (side.x * side.y + side.y * side.z + side.z * side.x)
         };
         let total = |k: &usize| cost(&bins[..*k]) + cost(&bins[*k..]);
@@ -183,20 +184,14 @@ fn cut(triangles: &mut [Triangle], depth: usize) -> usize {
     middle
 }
 
-fn union(a: (DVec3, DVec3), b: (DVec3, DVec3)) -> (DVec3, DVec3) {
-    (a.0.min(b.0), a.1.max(b.1))
-}
-
 impl Triangle {
-    fn bounds(&self) -> (DVec3, DVec3) {
-        let [a, b, c] = self.corners;
-        (a.min(b).min(c), a.max(b).max(c))
+    fn bounds(&self) -> Aabb {
+        Aabb::around(self.corners)
     }
 
     /// Middle of the box.
     fn middle(&self) -> DVec3 {
-        let (lower, upper) = self.bounds();
-        0.5 * lower + 0.5 * upper
+        self.bounds().centre()
     }
 }
 
@@ -247,7 +242,7 @@ impl ShearedRay {
     fn enter(&self, node: &Node, t_end: f64) -> Option<f64> {
         let (mut near, mut far) = (f64::from(self.t_min), f64::from(self.t_max).min(t_end));
         for axis in 0..3 {
-            let (mut first, mut last) = (node.lower[axis], node.upper[axis]);
+            let (mut first, mut last) = (node.bounds.lower[axis], node.bounds.upper[axis]);
             if self.inverse[axis].is_sign_negative() {
                 std::mem::swap(&mut first, &mut last);
             }

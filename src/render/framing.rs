@@ -106,8 +106,7 @@ fn aim(view: View<'_>) -> Option<Aim> {
         _ => 2,
     };
     let object = scene.objects.iter().filter(|o| o.mesh.bounds().is_some()).min_by_key(rank)?;
-    let (lo, hi) = object.mesh.bounds()?;
-    let middle = 0.5 * (lo + hi);
+    let middle = object.mesh.bounds()?.centre();
     let origin = scene.camera.origin;
     // The middle of a ring is empty: then the corner nearest to it.
     let meets = view.rays.closest(&Ray::new(origin, (middle - origin).as_vec3().normalize_or(Vec3::Z))).is_some();

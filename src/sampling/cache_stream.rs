@@ -1,6 +1,7 @@
 //! The long stream behind the sample cache.
 
 use crate::math::{hash_combine, unit_f32, unit_f64};
+use sobol_burley::parts::owen_scramble_rev;
 
 /// Dimensions of the stream.
 pub const DIMENSIONS: usize = 8;
@@ -15,8 +16,8 @@ pub enum Points {
     Independent,
 }
 
-/// Points of [0, 1)^8 by number. Ours because `sobol_burley` ends at 2^16 points; this one repeats after 2^32,
-/// then goes on with a new scramble.
+/// Points of [0, 1)^8 by number. The sequence is ours because that of `sobol_burley`, whose scrambling it has, ends at 2^16 points;
+/// this one repeats after 2^32, then goes on with a new scramble.
 #[derive(Clone, Debug)]
 pub struct CacheStream {
     points: Points,
@@ -64,7 +65,7 @@ impl CacheStream {
         match self.points {
             Points::Sobol => std::array::from_fn(|d| {
                 let scramble = hash_combine(hash_combine(self.key, d as u64), index >> 32);
-                owen_scramble(self.sobol(index as u32, d), scramble as u32)
+                owen_scramble_rev(self.sobol(index as u32, d).reverse_bits(), scramble as u32).reverse_bits()
             }),
             Points::Independent => {
                 let key = hash_combine(self.key, index);
@@ -90,19 +91,6 @@ impl CacheStream {
         let bits = self.point(index);
         (unit_f64(bits[0]), std::array::from_fn(|d| unit_f32(bits[d + 1])))
     }
-}
-
-/// Hash-based Owen scrambling: each bit is flipped by a hash of the bits above it [Laine, Karras 2011; constants
-/// of Vegdahl 2021].
-#[inline]
-fn owen_scramble(bits: u32, seed: u32) -> u32 {
-    let mut x = bits.reverse_bits();
-    x ^= x.wrapping_mul(0x3d20_adea);
-    x = x.wrapping_add(seed);
-    x = x.wrapping_mul((seed >> 16) | 1);
-    x ^= x.wrapping_mul(0x0552_6c56);
-    x ^= x.wrapping_mul(0x53a2_2864);
-    x.reverse_bits()
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ fn pair(index: u32, seed: u32) -> [f32; 2] {
 mod tests {
     use super::super::cosine_hemisphere;
     use super::*;
-    use crate::math::Frame;
+    use crate::math::frame;
 
     #[test]
     fn pairs_are_the_numbers_of_the_streams() {
@@ -153,7 +153,7 @@ mod tests {
             let got = pairs.cosine_hemisphere_at(level);
             assert_eq!(got.len(), expected.len());
             for (local, expected) in got.into_iter().zip(&expected) {
-                assert_eq!(Frame::about(n).to_world(local), *expected, "{level:?}");
+                assert_eq!(frame(n) * local, *expected, "{level:?}");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Warps take numbers, not generators.
 
-use crate::math::{Frame, Vec3};
+use crate::math::{Vec3, frame};
 use std::f32::consts::FRAC_PI_4;
 
 /// A point of the unit disk with constant density; concentric map [Shirley, Chiu 1997]. Without branches, so that loops
@@ -44,7 +44,7 @@ pub fn hemisphere(u: [f32; 2]) -> [f32; 3] {
 /// A unit direction about the unit normal `n` with density cosθ/π [1/sr]; its cosine is above 0.
 #[inline]
 pub fn cosine_hemisphere(n: Vec3, u: [f32; 2]) -> Vec3 {
-    Frame::about(n).to_world(Vec3::from_array(hemisphere(u)))
+    frame(n) * Vec3::from_array(hemisphere(u))
 }
 
 #[cfg(test)]

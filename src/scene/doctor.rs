@@ -115,9 +115,9 @@ fn remarks(object: &Object, surface: &Surface) -> Vec<Remark> {
             ),
         );
     }
-    if let Some((lo, hi)) = object.mesh.bounds() {
-        let farthest = lo.abs().max(hi.abs()).max_element();
-        let (size, step) = ((hi - lo).length(), farthest * f64::EPSILON);
+    if let Some(bounds) = object.mesh.bounds() {
+        let farthest = bounds.farthest();
+        let (size, step) = (bounds.extent().length(), farthest * f64::EPSILON);
         if size > 0.0 && step > COARSE * size {
             say(
                 true,

@@ -55,8 +55,7 @@ impl Shape {
         let (volume, bend) = (found.volume.filter(|v| *v > 0.0)?, found.bend?);
         let mesh = &object.mesh;
         let area: f64 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
-        let (lo, hi) = mesh.bounds()?;
-        let shortest = (hi - lo).min_element();
+        let shortest = mesh.bounds()?.extent().min_element();
         let (sheet, curvature) = (2.0 * volume / area, bend / area);
         // Convex bodies have at most 2/3 [Minkowski].
         let round = (sheet * curvature).clamp(0.0, 2.0 / 3.0);

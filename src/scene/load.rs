@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{
     Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere,
 };
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb, DVec3, Vec3};
 use crate::memory;
 use crate::words::{counted, either};
 
@@ -175,7 +175,7 @@ fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<St
             either(bare, "is", "are")
         ));
     }
-    mesh = mesh.placed(entry.transform.linear, entry.transform.translate);
+    mesh = mesh.placed(entry.transform);
     if entry.flip {
         mesh = mesh.flipped();
     }
@@ -210,13 +210,9 @@ fn smooths_nothing(entry: &ObjectEntry, alone: usize, found: &Findings, transluc
     ))
 }
 
-/// Middle of the box around all meshes; halved before it is added, so that it cannot overflow.
+/// Middle of the box around all meshes.
 fn centre<'a>(meshes: impl IntoIterator<Item = &'a ObjMesh>) -> Option<DVec3> {
-    meshes
-        .into_iter()
-        .filter_map(ObjMesh::bounds)
-        .reduce(|(lo, hi), (other_lo, other_hi)| (lo.min(other_lo), hi.max(other_hi)))
-        .map(|(lo, hi)| 0.5 * lo + 0.5 * hi)
+    meshes.into_iter().filter_map(ObjMesh::bounds).reduce(Aabb::join).map(|bounds| bounds.centre())
 }
 
 fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {

@@ -27,7 +27,7 @@ mod world;
 pub use environment::EnvironmentEntry;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
-pub use objects::{Geometry, NormalsChoice, ObjectEntry, Transform};
+pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread};
 pub use world::{Emission, Material, Object, Scene, Surface, Translucent};

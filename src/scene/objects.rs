@@ -1,6 +1,6 @@
 //! `[[object]]` as typed.
 
-use glam::DMat3;
+use glam::DMat4;
 use std::collections::HashMap;
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use super::options::named;
 use super::tree::{Fields, Node, Value};
 use super::values::{named_value, switch, unknown, vector};
 use crate::error::Result;
-use crate::math::DVec3;
+use crate::math::{DAffine3, DMat3, DVec3};
 
 /// One object.
 #[derive(Clone, Debug)]
@@ -24,8 +24,8 @@ pub struct ObjectEntry {
     pub normals: NormalsChoice,
     /// Exchange inside and outside.
     pub flip: bool,
-    /// From its own space into the scene's.
-    pub transform: Transform,
+    /// From its own space into the scene's [unit]; has an inverse.
+    pub transform: DAffine3,
     /// File and line, for messages.
     pub at: String,
 }
@@ -56,15 +56,6 @@ pub enum Geometry {
         /// Triangles around, 3 to 8192.
         segments: u32,
     },
-}
-
-/// x -> `linear` x + `translate`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Transform {
-    /// Scale and rotation, with an inverse.
-    pub linear: DMat3,
-    /// Shift \[unit\].
-    pub translate: DVec3,
 }
 
 named! {
@@ -157,10 +148,8 @@ fn geometry(o: &Fields<'_>) -> Result<Geometry> {
     }
 }
 
-fn transform(o: &Fields<'_>) -> Result<Transform> {
-    let Some(t) = o.table("transform")? else {
-        return Ok(Transform { linear: DMat3::IDENTITY, translate: DVec3::ZERO });
-    };
+fn transform(o: &Fields<'_>) -> Result<DAffine3> {
+    let Some(t) = o.table("transform")? else { return Ok(DAffine3::IDENTITY) };
     t.only("a transform", &["scale", "rotate", "translate", "matrix"])?;
     const MATRIX: &str = "3 rows of 3 numbers, or 4 rows of 4 with the last [0, 0, 0, 1]";
     let transform = if let Some(matrix) = t.get("matrix", MATRIX, matrix)? {
@@ -176,16 +165,16 @@ fn transform(o: &Fields<'_>) -> Result<Transform> {
         let rotate = t.get("rotate", "degrees about x, y and z, three numbers", vector)?.unwrap_or(DVec3::ZERO);
         let linear = about(2, rotate.z) * about(1, rotate.y) * about(0, rotate.x);
         let translate = t.get("translate", "three numbers [x, y, z]", vector)?.unwrap_or(DVec3::ZERO);
-        Transform { linear: linear * DMat3::from_diagonal(scale.unwrap_or(DVec3::ONE)), translate }
+        DAffine3::from_mat3_translation(linear * DMat3::from_diagonal(scale.unwrap_or(DVec3::ONE)), translate)
     };
     // Each column over its largest entry, so that no scale but only the shape of the map decides.
-    let columns = [transform.linear.x_axis, transform.linear.y_axis, transform.linear.z_axis];
-    let shape = DMat3::from_cols_array_2d(&columns.map(|c| (c / c.abs().max_element()).to_array()));
-    let inverse = transform.linear.inverse();
+    let linear = transform.matrix3;
+    let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis].map(|c| c / c.abs().max_element());
+    let shape = DMat3::from_cols(x, y, z);
     if shape.determinant().abs() <= 1e-12
         || !shape.is_finite()
-        || !inverse.is_finite()
-        || transform.linear.determinant() == 0.0
+        || !linear.inverse().is_finite()
+        || linear.determinant() == 0.0
     {
         let key = if t.has("matrix") { "matrix" } else { "scale" };
         return Err(
@@ -195,18 +184,20 @@ fn transform(o: &Fields<'_>) -> Result<Transform> {
     Ok(transform)
 }
 
-fn matrix(node: &Node) -> Option<Transform> {
+fn matrix(node: &Node) -> Option<DAffine3> {
     let Value::List(rows) = &node.value else { return None };
-    if rows.len() == 3 {
-        let [a, b, c] = [rows[0].numbers::<3>()?, rows[1].numbers::<3>()?, rows[2].numbers::<3>()?];
-        return Some(Transform { linear: DMat3::from_cols_array_2d(&[a, b, c]).transpose(), translate: DVec3::ZERO });
+    match &rows[..] {
+        [a, b, c] => {
+            let rows = [a.numbers::<3>()?, b.numbers::<3>()?, c.numbers::<3>()?];
+            Some(DAffine3::from_mat3(DMat3::from_cols_array_2d(&rows).transpose()))
+        }
+        [a, b, c, d] => {
+            let rows = [a.numbers::<4>()?, b.numbers::<4>()?, c.numbers::<4>()?, d.numbers::<4>()?];
+            let map = DMat4::from_cols_array_2d(&rows).transpose();
+            (rows[3] == [0.0, 0.0, 0.0, 1.0]).then(|| DAffine3::from_mat4(map))
+        }
+        _ => None,
     }
-    if rows.len() != 4 || rows[3].numbers::<4>()? != [0.0, 0.0, 0.0, 1.0] {
-        return None;
-    }
-    let [a, b, c] = [rows[0].numbers::<4>()?, rows[1].numbers::<4>()?, rows[2].numbers::<4>()?];
-    let linear = DMat3::from_cols_array_2d(&[a, b, c].map(|r| [r[0], r[1], r[2]])).transpose();
-    Some(Transform { linear, translate: DVec3::new(a[3], b[3], c[3]) })
 }
 
 /// Rotation by `degrees` about an axis, counter-clockwise seen from its tip; quarter turns are exact.

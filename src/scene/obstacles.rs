@@ -4,7 +4,7 @@
 use super::insides::Found;
 use super::{Object, Obstacle, ObstacleKind, Scene};
 use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, meeting, mended};
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 use crate::words::{self, counted, either, percent};
 
 /// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
@@ -41,7 +41,7 @@ struct Body<'a> {
     object: &'a Object,
     kind: Role,
     solid: Solid,
-    bounds: (DVec3, DVec3),
+    bounds: Aabb,
     /// The gap that its surface needs, as a share of the largest coordinate.
     share: f64,
 }
@@ -64,18 +64,15 @@ impl Found {
         let all: Vec<_> =
             (0_u32..).zip(&scene.objects).filter_map(|(i, o)| Some((i, o, role(o), o.mesh.bounds()?))).collect();
         let share = scene.objects.iter().map(|o| OFFSETS * o.mesh.precision.error(1.0)).fold(LEAST_GAP, f64::max);
-        let near = |a: &(DVec3, DVec3), b: &(DVec3, DVec3)| {
-            let gap = DVec3::splat(gap(share, a, b));
-            a.0.cmple(b.1 + gap).all() && b.0.cmple(a.1 + gap).all()
-        };
+        let near = |a: &Aabb, b: &Aabb| a.is_near(b, gap(share, a, b));
         // Pairs whose boxes come near each other, one of them of a medium; along the axis sorted by.
         let mut order: Vec<usize> = (0..all.len()).collect();
-        order.sort_by(|&a, &b| all[a].3.0.x.total_cmp(&all[b].3.0.x));
+        order.sort_by(|&a, &b| all[a].3.lower.x.total_cmp(&all[b].3.lower.x));
         let (mut pairs, mut wanted) = (Vec::new(), vec![false; all.len()]);
         for (place, &i) in order.iter().enumerate() {
             wanted[i] |= all[i].2 == Role::Medium;
             for &j in &order[place + 1..] {
-                if all[j].3.0.x > all[i].3.1.x + gap(share, &all[i].3, &all[j].3) {
+                if all[j].3.lower.x > all[i].3.upper.x + gap(share, &all[i].3, &all[j].3) {
                     break;
                 }
                 let medium = [i, j].iter().any(|&k| all[k].2 == Role::Medium);
@@ -116,7 +113,7 @@ impl Found {
     /// Whether the camera is in a body.
     fn look_from(&mut self, scene: &Scene, body: &Body<'_>, solid: bool) {
         let camera = scene.camera.origin;
-        let gap = gap(body.share, &body.bounds, &(camera, camera));
+        let gap = gap(body.share, &body.bounds, &Aabb::around([camera]));
         let obstacle = |kind, what: String, remedy: String| Obstacle {
             kind,
             objects: vec![body.object.name.clone()],
@@ -142,8 +139,8 @@ impl Found {
 }
 
 /// Distance [unit] below which surfaces within the two boxes are as good as in one place.
-fn gap(share: f64, a: &(DVec3, DVec3), b: &(DVec3, DVec3)) -> f64 {
-    share * [a.0, a.1, b.0, b.1].iter().map(|p| p.abs().max_element()).fold(0.0, f64::max)
+fn gap(share: f64, a: &Aabb, b: &Aabb) -> f64 {
+    share * a.farthest().max(b.farthest())
 }
 
 /// A place in the file's coordinates; `gap` is what counts as one place.
@@ -281,8 +278,10 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
     let [mut nested, mut open, mut turned] = [(0_usize, 0.0); 3];
     for (i, part) in parts.iter().enumerate() {
         let around = |(j, other): (usize, &Part)| {
-            let inside = other.bounds.0.cmple(part.bounds.0).all() && other.bounds.1.cmpge(part.bounds.1).all();
-            j != i && other.closed && inside
+            j != i
+                && other.closed
+                && other.bounds.contains(part.bounds.lower)
+                && other.bounds.contains(part.bounds.upper)
         };
         if part.area == 0.0 || part.closed && part.volume.abs() <= gap * part.area {
             continue;
@@ -396,9 +395,8 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> Option<Obstacle> {
 
 /// Whether a part of `inner` is inside `outer`, where their surfaces do not cross.
 fn holds(outer: &Solid, inner: &Solid) -> bool {
-    let Some((lo, hi)) = outer.bounds() else { return false };
+    let Some(bounds) = outer.bounds() else { return false };
     inner.parts.iter().enumerate().any(|(i, part)| {
-        let within = part.bounds.0.cmple(hi).all() && part.bounds.1.cmpge(lo).all();
-        within && outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0)
+        part.bounds.is_near(&bounds, 0.0) && outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0)
     })
 }

@@ -5,7 +5,7 @@
 use super::doctor::COARSE;
 use super::{Material, Object, Surface, Translucent};
 use crate::geometry::{AreaTable, Mesh, Precision};
-use crate::math::DVec3;
+use crate::math::{Aabb, DVec3};
 use crate::words::{percent, short};
 use rayon::prelude::*;
 
@@ -42,7 +42,7 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         .iter()
         .map(|o| match materials[o.material].surface {
             Surface { emission: Some(_), .. } => 0.0,
-            _ => o.mesh.bounds().map_or(0.0, |(lo, hi)| Precision::Single.error(lo.abs().max(hi.abs()).max_element())),
+            _ => o.mesh.bounds().map_or(0.0, |bounds| Precision::Single.error(bounds.farthest())),
         })
         .collect();
     // The two largest: one of them is another object's.
@@ -50,8 +50,8 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
     worst.sort_by(|a, b| b.1.total_cmp(&a.1));
     worst.truncate(2);
     for object in objects {
-        let Some((lo, hi)) = object.mesh.bounds() else { continue };
-        let (size, farthest) = ((hi - lo).length(), lo.abs().max(hi.abs()).max_element());
+        let Some(bounds) = object.mesh.bounds() else { continue };
+        let (size, farthest) = (bounds.extent().length(), bounds.farthest());
         let step = farthest * f64::from(f32::EPSILON);
         if size > 0.0 && step > COARSE * size {
             choice.why_double = choice.why_double.or(Some(format!(
@@ -165,8 +165,7 @@ fn probes(object: &Object, reach: f64) -> Option<Vec<Probe>> {
             }
         })
         .collect();
-    let (lo, hi) = mesh.bounds()?;
-    let axis = (hi - lo).max_position();
+    let axis = mesh.bounds()?.longest_axis();
     probes.sort_unstable_by(|a, b| a.x[axis].total_cmp(&b.x[axis]).then(a.triangle.cmp(&b.triangle)));
     let facing = if object.findings.mixed_edges == 0 { Some(facing) } else { None };
     let found = thicknesses(mesh, &probes, axis, facing);
@@ -181,14 +180,12 @@ fn thicknesses(mesh: &Mesh, probes: &[Probe], axis: usize, facing: Option<f64>) 
     let none = || vec![f64::INFINITY; probes.len()];
     let add = |mut found: Vec<f64>, triangle: u32| {
         let corners = mesh.corners(triangle);
-        let [a, b, c] = corners;
-        let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
-        let first = probes.partition_point(|p| p.x[axis] < lo[axis] - longest);
-        let last = probes.partition_point(|p| p.x[axis] <= hi[axis] + longest);
+        let bounds = Aabb::around(corners);
+        let first = probes.partition_point(|p| p.x[axis] < bounds.lower[axis] - longest);
+        let last = probes.partition_point(|p| p.x[axis] <= bounds.upper[axis] + longest);
         for (probe, found) in probes[first..last].iter().zip(&mut found[first..last]) {
             let end = probe.x + probe.inwards * probe.reach;
-            let apart = probe.x.min(end).cmpgt(hi).any() || probe.x.max(end).cmplt(lo).any();
-            if !apart && triangle != probe.triangle {
+            if Aabb::around([probe.x, end]).is_near(&bounds, 0.0) && triangle != probe.triangle {
                 *found = found.min(probe.other_side(corners, facing).unwrap_or(f64::INFINITY));
             }
         }

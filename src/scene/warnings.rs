@@ -88,10 +88,10 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
         said.extend(found.map(|what| format!("{head}: {what}")));
         if let Some(t) = &scene.materials[object.material].surface.inside
-            && let Some((lo, hi)) = object.mesh.bounds()
+            && let Some(bounds) = object.mesh.bounds()
         {
             // Of a body that light hardly meets no model need be spoken.
-            if let Some(what) = thin(t, (hi - lo).length()) {
+            if let Some(what) = thin(t, bounds.extent().length()) {
                 said.push(format!("{head}: {what}"));
             } else if models_are_used(file) && !scene.has(object, ObstacleKind::Sheet) {
                 let material = &scene.materials[object.material].name;
@@ -132,16 +132,15 @@ fn shut_in(file: &SceneFile, scene: &Scene) -> Option<String> {
     let boxes: Vec<_> = boxes.collect();
     let shines = |o: &super::Object| scene.materials[o.material].surface.shines();
     let holds_camera = |&i: &usize| {
-        let (object, Some((lo, hi))) = (&scene.objects[i], boxes[i]) else { return false };
+        let (object, Some(own)) = (&scene.objects[i], boxes[i]) else { return false };
         let opaque = scene.materials[object.material].surface.is_opaque();
         let lamp_near = || {
             let mut others = scene.objects.iter().zip(&boxes);
-            others.any(|(o, b)| shines(o) && b.is_some_and(|b| b.0.cmple(hi).all() && b.1.cmpge(lo).all()))
+            others.any(|(o, b)| shines(o) && b.is_some_and(|b| b.is_near(&own, 0.0)))
         };
         opaque
             && object.findings.open_edges == 0
-            && eye.cmpge(lo).all()
-            && eye.cmple(hi).all()
+            && own.contains(eye)
             && !lamp_near()
             && Solid::new(&object.mesh).winding(eye, |_| true).is_some_and(|w| w != 0)
     };

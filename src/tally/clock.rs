@@ -32,13 +32,4 @@ impl Clock {
     }
 }
 
-impl std::ops::AddAssign for Clock {
-    fn add_assign(&mut self, other: Self) {
-        self.survey += other.survey;
-        self.fill += other.fill;
-        self.tree += other.tree;
-        self.rays += other.rays;
-        self.near += other.near;
-        self.gather += other.gather;
-    }
-}
+adds_up!(Clock { survey, fill, tree, rays, near, gather });

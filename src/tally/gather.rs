@@ -26,17 +26,4 @@ pub struct GatherTally {
     pub clamped: u64,
 }
 
-impl std::ops::AddAssign for GatherTally {
-    fn add_assign(&mut self, other: Self) {
-        self.samples += other.samples;
-        self.lit += other.lit;
-        self.exits += other.exits;
-        self.nodes += other.nodes;
-        self.pairs += other.pairs;
-        self.evaluated += other.evaluated;
-        self.near_points += other.near_points;
-        self.near += other.near;
-        self.non_finite += other.non_finite;
-        self.clamped += other.clamped;
-    }
-}
+adds_up!(GatherTally { samples, lit, exits, nodes, pairs, evaluated, near_points, near, non_finite, clamped });

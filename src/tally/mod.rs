@@ -1,5 +1,17 @@
 //! What work cost: counts and seconds, added up over tasks and passes. Not for: what is said of them.
 
+/// Sums of a struct are the sums of its fields, all of which are named.
+macro_rules! adds_up {
+    ($name:ident { $($field:ident),+ $(,)? }) => {
+        impl std::ops::AddAssign for $name {
+            fn add_assign(&mut self, other: Self) {
+                let Self { $($field),+ } = other;
+                $(self.$field += $field;)+
+            }
+        }
+    };
+}
+
 mod clock;
 mod gather;
 mod losses;
@@ -53,24 +65,6 @@ impl WalkTally {
     }
 }
 
-impl std::ops::AddAssign for WalkTally {
-    fn add_assign(&mut self, other: Self) {
-        self.walks += other.walks;
-        self.collisions += other.collisions;
-        self.clear += other.clear;
-        self.rays += other.rays;
-        self.photons += other.photons;
-        self.vertices += other.vertices;
-        self.connections += other.connections;
-        self.losses += other.losses;
-    }
-}
+adds_up!(WalkTally { walks, collisions, clear, rays, photons, vertices, connections, losses });
 
-impl std::ops::AddAssign for Tally {
-    fn add_assign(&mut self, other: Self) {
-        self.rays += other.rays;
-        self.gather += other.gather;
-        self.walk += other.walk;
-        self.clock += other.clock;
-    }
-}
+adds_up!(Tally { rays, gather, walk, clock });

@@ -120,13 +120,13 @@ fn of_distance(scene: &Scene, model: &dyn Radial) -> [f64; 3] {
 /// Of light scattered once in a plane at the spot.
 fn single_on_a_plane(scene: &Scene) -> [f64; 3] {
     let (spot, single) = (spot(scene), SingleScattering::new(&translucent(scene).medium));
-    let frame = marmor::math::Frame::about(spot.n);
+    let frame = marmor::math::frame(spot.n);
     let mut sum = [0.0; 3];
     for (mu, weight) in GaussLegendre::new(24).points_on(0.0, 1.0) {
         for k in 0..32 {
             let (sin, cos) = (std::f64::consts::TAU / 32.0 * f64::from(k)).sin_cos();
             let r = (1.0 - mu * mu).sqrt();
-            let w = frame.to_world(Vec3::new((r * cos) as f32, (r * sin) as f32, mu as f32));
+            let w = frame * Vec3::new((r * cos) as f32, (r * sin) as f32, mu as f32);
             let f = single.plane_brdf(w, spot.w, spot.n);
             (0..3).for_each(|c| sum[c] += f64::from(f[c]) * mu * weight * std::f64::consts::TAU / 32.0);
         }

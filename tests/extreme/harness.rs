@@ -1,5 +1,7 @@
 //! One small scene, changed in one place by each case, and what its pictures must be.
 
+pub use super::rendering::backends;
+use super::rendering::options;
 use marmor::ErrorKind;
 use marmor::bssrdf::ModelName;
 use marmor::film::{Counts, Film, Image, Window};
@@ -8,8 +10,7 @@ use marmor::integrator::{
 };
 use marmor::query::{self, Backend};
 use marmor::render::{Job, run};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Orders, Scene, SceneFile};
 use marmor::tally::Tally;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -112,24 +113,9 @@ impl Shot {
     }
 }
 
-pub fn backends() -> impl Iterator<Item = Backend> {
-    Backend::ALL.into_iter().filter(|b| b.is_built_in())
-}
-
 /// Options of the case's subsurface renders.
 pub fn subsurface(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
-    SubsurfaceOptions {
-        single: true,
-        cache_samples,
-        estimator,
-        cut_error: Some(0.1),
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        spread: Spread::Seen,
-        specular: true,
-        light_samples: 1,
-        seed: 1,
-    }
+    SubsurfaceOptions { single: true, cut_error: Some(0.1), ..options(estimator, cache_samples, 1) }
 }
 
 /// The film of some passes, and what they cost.

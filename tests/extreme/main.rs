@@ -13,4 +13,6 @@ mod lights;
 mod list;
 mod media;
 mod meshes;
+#[path = "../rendering/mod.rs"]
+mod rendering;
 mod sizes;

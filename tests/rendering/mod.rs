@@ -33,6 +33,11 @@ pub fn film(
     film
 }
 
+/// Every backend of this build.
+pub fn backends() -> impl Iterator<Item = Backend> {
+    Backend::ALL.into_iter().filter(|b| b.is_built_in())
+}
+
 /// The default method with `cache_samples` a pass.
 pub fn options(estimator: Estimator, cache_samples: u32, seed: u64) -> SubsurfaceOptions {
     SubsurfaceOptions {

@@ -1,6 +1,6 @@
 //! Photons in cubes of space, to find those within reach of a point.
 
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::math::{Aabb, DVec3, Rgb, Vec3};
 
 /// Light scattered at a point.
 #[derive(Clone, Copy, Debug)]
@@ -32,18 +32,17 @@ impl Cells {
     /// `photons` for queries of radius `reach` [unit], whose connections yield to the walk by `yielding` [unit²]: see
     /// [`super::connect::walked_share`].
     pub fn new(photons: Vec<Photon>, reach: f32, yielding: f32) -> Self {
-        let (lo, hi) =
-            photons.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p.x), hi.max(p.x)));
+        let bounds = Aabb::around(photons.iter().map(|p| p.x));
         if photons.is_empty() {
             return Self { lo: DVec3::ZERO, edge: 1.0, size: [0; 3], starts: vec![0], photons, reach, yielding };
         }
-        let side = (hi - lo).as_vec3().max(Vec3::splat(1e-6 * reach));
+        let side = bounds.extent().as_vec3().max(Vec3::splat(1e-6 * reach));
         let finest = (side.x as f64 * side.y as f64 * side.z as f64 / MOST_CELLS).cbrt() as f32;
         let longest = side.max_element() / 1000.0;
         let edge = (0.5 * reach).max(finest).max(longest);
         let size = (side / edge).to_array().map(|n| n as usize + 1);
         let starts = vec![0; size.iter().product::<usize>() + 1];
-        let mut cells = Self { lo, edge, size, starts, photons, reach, yielding };
+        let mut cells = Self { lo: bounds.lower, edge, size, starts, photons, reach, yielding };
         let homes: Vec<u32> = cells.photons.iter().map(|p| cells.home(p.x)).collect();
         for &home in &homes {
             cells.starts[home as usize + 1] += 1;

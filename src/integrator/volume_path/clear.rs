@@ -1,7 +1,6 @@
 //! Light that comes to a surface only through a clear body: no shadow ray passes a boundary, so paths meet it by chance.
 
 use crate::light::Lights;
-use crate::math::DVec3;
 use crate::optics::Medium;
 use crate::scene::{Object, Scene, Surface};
 use std::f64::consts::PI;
@@ -69,7 +68,7 @@ fn is_small(scene: &Scene, lamp: &Object, body: &Object) -> bool {
     if !scene.materials[lamp.material].surface.shines() {
         return false;
     }
-    let middle = |o: &Object| o.mesh.bounds().map(|(lo, hi): (DVec3, DVec3)| 0.5 * (lo + hi));
+    let middle = |o: &Object| o.mesh.bounds().map(|bounds| bounds.centre());
     let (Some(a), Some(b)) = (middle(lamp), middle(body)) else { return false };
     let area: f64 = (0..lamp.mesh.triangles.len() as u32).map(|t| lamp.mesh.area(t)).sum();
     area > 0.0 && area < SMALL * PI * a.distance_squared(b)

@@ -1,7 +1,7 @@
 //! All facets of a body through which light from one point outside, or from one direction, is refracted to one point inside.
 
 use crate::geometry::Mesh;
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb32, DVec3, Vec3};
 
 /// The triangles of a mesh in a binary tree of balls around places and cones around normals, after [WZHB09], whose tree is
 /// of boxes. 44 bytes a node, 4 a triangle.
@@ -94,8 +94,7 @@ struct Item {
 impl Facets {
     /// The tree of `mesh`; triangles without area are left out. `eta` = n_inside / n_outside. `None` without triangles.
     pub fn new(mesh: &Mesh, eta: f32) -> Option<Self> {
-        let (lo, hi) = mesh.bounds()?;
-        let origin = 0.5 * lo + 0.5 * hi;
+        let origin = mesh.bounds()?.centre();
         let mut items: Vec<Item> = (0..mesh.triangles.len() as u32)
             .filter_map(|triangle| {
                 let normal = mesh.geometric_normal(triangle);
@@ -128,9 +127,7 @@ impl Facets {
             self.order.extend(items.iter().map(|item| item.triangle));
             return;
         }
-        let (lo, hi) =
-            items.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), i| (lo.min(i.middle), hi.max(i.middle)));
-        let axis = (hi - lo).max_position();
+        let axis = Aabb32::around(items.iter().map(|i| i.middle)).longest_axis();
         let middle = items.len() / 2;
         items.select_nth_unstable_by(middle, |a, b| {
             a.middle[axis].total_cmp(&b.middle[axis]).then(a.triangle.cmp(&b.triangle))
@@ -320,8 +317,7 @@ impl Node {
     fn around(mesh: &Mesh, origin: DVec3, items: &[Item]) -> Self {
         let corners = || items.iter().flat_map(|i| mesh.corners(i.triangle)).map(|q| (q - origin).as_vec3());
         let normals = || items.iter().map(|i| i.normal);
-        let (lo, hi) = corners().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(lo, hi), q| (lo.min(q), hi.max(q)));
-        let centre = 0.5 * lo + 0.5 * hi;
+        let centre = Aabb32::around(corners()).centre();
         let radius = corners().map(|q| q.distance(centre)).fold(0.0, f32::max);
         let rounding = 8.0 * f32::EPSILON * (radius + centre.abs().max_element());
         let axis = normals().sum::<Vec3>().normalize_or_zero();

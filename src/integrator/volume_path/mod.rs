@@ -230,9 +230,9 @@ impl VolumePath {
 fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
     let Some(t) = &scene.materials[object.material].surface.inside else { return None };
-    let (lo, hi) = object.mesh.bounds()?;
+    let bounds = object.mesh.bounds()?;
     let meshes = scene.objects.iter().map(|o| &o.mesh);
-    let clearance = Clearance::new(meshes, lo, hi, cells);
+    let clearance = Clearance::new(meshes, bounds, cells);
     let body = Body::new(index as u32, &t.medium, clearance);
     let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
     let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {

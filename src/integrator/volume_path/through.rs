@@ -40,12 +40,11 @@ impl Through {
             return None;
         }
         let mesh = &scene.objects[object as usize].mesh;
-        let (lo, hi) = mesh.bounds()?;
+        let bounds = mesh.bounds()?;
         // HG's largest value [1/sr].
         let phase = (1.0 + g.abs()) / (4.0 * PI * (1.0 - g.abs()).powi(2));
         let is_alone = |lamp: u32| {
-            let bounds = scene.objects[lamp as usize].mesh.bounds();
-            let gap = bounds.map_or(0.0, |b| (b.0 - hi).max(lo - b.1).max(DVec3::ZERO).length() as f32);
+            let gap = scene.objects[lamp as usize].mesh.bounds().map_or(0.0, |lamp| lamp.distance(&bounds) as f32);
             // The focus of a flat boundary seen from behind it is at most 1/(η L)² times the cosine's ratio.
             phase / lights.pdf_area(lamp) < ALONE_BELOW * gap * gap * (eta * eta).min(1.0)
         };

@@ -8,12 +8,12 @@
 use rayon::prelude::*;
 
 use super::fold::{Fold, Place};
-use super::node::{Bounds, Child, Node, WIDTH};
+use super::node::{Child, Node, WIDTH};
 use super::split::{self, Range, Ref};
 use super::stack::STACK;
 use super::triangle::{LANES, Pack};
 use crate::geometry::Mesh;
-use crate::math::{DVec3, Vec3};
+use crate::math::{Aabb32, DVec3, Vec3};
 use crate::query::{has_area, rounded};
 
 /// Which triangle of which mesh lies at a place in a pack.
@@ -74,7 +74,7 @@ impl Tree {
         let plan = plan(Range::new(refs), halve, 0);
         let mut tasks = Vec::new();
         let outline = outline(plan, &mut tasks);
-        let parts: Vec<(Self, Bounds)> = tasks
+        let parts: Vec<(Self, Aabb32)> = tasks
             .into_par_iter()
             .map(|range| {
                 let Range { refs, .. } = range;
@@ -102,31 +102,31 @@ impl Tree {
     }
 
     /// Nodes and packs of a folded range, depth first.
-    fn grow(&mut self, source: &Source<'_>, fold: &Fold, refs: &[Ref], place: Place) -> (Child, Bounds) {
+    fn grow(&mut self, source: &Source<'_>, fold: &Fold, refs: &[Ref], place: Place) -> (Child, Aabb32) {
         match place {
             Place::Leaf { start, count } => self.push_leaf(source, &refs[start..start + count]),
             Place::Node(at) => {
                 let node = self.nodes.len();
                 self.nodes.push(Node::new(&[]));
-                let children: Vec<(Child, Bounds)> =
+                let children: Vec<(Child, Aabb32)> =
                     fold.places(at).into_iter().map(|place| self.grow(source, fold, refs, place)).collect();
                 self.nodes[node] = Node::new(&children);
-                (Child::Inner(node as u32), union_of(&children))
+                (Child::Inner(node as u32), around(&children))
             }
         }
     }
 
-    fn push_leaf(&mut self, source: &Source<'_>, refs: &[Ref]) -> (Child, Bounds) {
+    fn push_leaf(&mut self, source: &Source<'_>, refs: &[Ref]) -> (Child, Aabb32) {
         let owner = |lane: usize| source.owners[refs[if lane < refs.len() { lane } else { 0 }].item() as usize];
         let corners: Vec<[Vec3; 3]> = (0..refs.len()).map(|lane| source.corners(owner(lane))).collect();
-        let bounds = corners.iter().map(bounds_of).reduce(union).unwrap_or_default();
+        let bounds = Aabb32::around(corners.iter().flatten().copied());
         self.packs.push(Pack::new(&corners));
         self.owners.push(std::array::from_fn(owner));
         (Child::Leaf(self.packs.len() as u32 - 1), bounds)
     }
 
     /// Appends the parts in the order of the outline, under the nodes above them.
-    fn assemble(&mut self, outline: &Outline, parts: &mut impl Iterator<Item = (Self, Bounds)>) -> (Child, Bounds) {
+    fn assemble(&mut self, outline: &Outline, parts: &mut impl Iterator<Item = (Self, Aabb32)>) -> (Child, Aabb32) {
         match outline {
             Outline::Part => {
                 let (part, bounds) = parts.next().unwrap_or_default();
@@ -139,9 +139,9 @@ impl Tree {
             Outline::Node(outlines) => {
                 let node = self.nodes.len();
                 self.nodes.push(Node::new(&[]));
-                let children: Vec<(Child, Bounds)> = outlines.iter().map(|o| self.assemble(o, parts)).collect();
+                let children: Vec<(Child, Aabb32)> = outlines.iter().map(|o| self.assemble(o, parts)).collect();
                 self.nodes[node] = Node::new(&children);
-                (Child::Inner(node as u32), union_of(&children))
+                (Child::Inner(node as u32), around(&children))
             }
         }
     }
@@ -204,13 +204,13 @@ impl<'a> Source<'a> {
             owners.par_extend(with_area.map(|triangle| Owner { mesh: number, triangle }));
         }
         let source = Self { meshes, owners };
-        let all = source.owners.par_iter().map(|&o| bounds_of(&source.corners(o))).reduce_with(union);
-        let (lower, upper) = all.unwrap_or_default();
+        let all = source.owners.par_iter().map(|&o| Aabb32::around(source.corners(o))).reduce_with(Aabb32::join);
+        let Aabb32 { lower, upper } = all.unwrap_or_default();
         let lower = lower.as_dvec3();
         let scale = 1.0 / (upper.as_dvec3() - lower).max_element();
         let place = |p: Vec3| -> DVec3 { (p.as_dvec3() - lower) * scale };
         let refs = source.owners.par_iter().enumerate().map(|(item, &owner)| {
-            let (lower, upper) = bounds_of(&source.corners(owner));
+            let Aabb32 { lower, upper } = Aabb32::around(source.corners(owner));
             Ref::new(place(lower).as_vec3(), place(upper).as_vec3(), item as u32)
         });
         let refs = refs.collect();
@@ -222,16 +222,8 @@ impl<'a> Source<'a> {
     }
 }
 
-fn bounds_of(&[a, b, c]: &[Vec3; 3]) -> Bounds {
-    (a.min(b).min(c), a.max(b).max(c))
-}
-
-fn union(a: Bounds, b: Bounds) -> Bounds {
-    (a.0.min(b.0), a.1.max(b.1))
-}
-
-fn union_of(children: &[(Child, Bounds)]) -> Bounds {
-    children.iter().map(|(_, bounds)| *bounds).reduce(union).unwrap_or_default()
+fn around(children: &[(Child, Aabb32)]) -> Aabb32 {
+    children.iter().map(|(_, bounds)| *bounds).fold(Aabb32::EMPTY, Aabb32::join)
 }
 
 #[cfg(test)]

@@ -1,13 +1,10 @@
 //! A node with the boxes of eight children, and the test of a ray against the eight at once.
 
 use super::super::Ray;
-use crate::math::{F8, Simd, Vec3, splat3};
+use crate::math::{Aabb32, F8, Simd, splat3};
 
 /// Children of a node, one a lane.
 pub const WIDTH: usize = 8;
-
-/// A box: its lower and its upper corner [unit].
-pub type Bounds = (Vec3, Vec3);
 
 /// Boxes and children of an inner node: arrays by coordinate, then by child, so that one instruction serves all boxes.
 #[derive(Clone, Debug)]
@@ -123,14 +120,14 @@ impl<S: Simd> NodeRay<S> {
 
 impl Node {
     /// A node of up to eight children with their boxes.
-    pub fn new(children: &[(Child, Bounds)]) -> Self {
+    pub fn new(children: &[(Child, Aabb32)]) -> Self {
         // An empty box has its ends exchanged at infinity: every ray leaves it before it enters.
         let mut node = Self {
             bounds: [[[f32::INFINITY; WIDTH]; 3], [[f32::NEG_INFINITY; WIDTH]; 3]],
             children: [0; WIDTH],
             count: 0,
         };
-        for (i, (child, (lower, upper))) in children.iter().enumerate() {
+        for (i, (child, Aabb32 { lower, upper })) in children.iter().enumerate() {
             for axis in 0..3 {
                 node.bounds[0][axis][i] = lower[axis];
                 node.bounds[1][axis][i] = upper[axis];
@@ -196,7 +193,7 @@ impl Node {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{DVec3, LaneKernel, Lanes, Level, hash, unit_f32};
+    use crate::math::{DVec3, LaneKernel, Lanes, Level, Vec3, hash, unit_f32};
 
     struct Enter<'a>(&'a Node, Ray);
 
@@ -219,7 +216,7 @@ mod tests {
 
     #[test]
     fn rays_in_the_planes_of_a_box_enter_it_and_rays_beside_do_not() {
-        let node = Node::new(&[(Child::Leaf(0), (Vec3::ZERO, Vec3::ONE))]);
+        let node = Node::new(&[(Child::Leaf(0), Aabb32::around([Vec3::ZERO, Vec3::ONE]))]);
         for sign in [1.0, -1.0] {
             for x in [0.0, 0.5, 1.0] {
                 // Along z, with zeros of both signs across it.
@@ -235,7 +232,7 @@ mod tests {
 
     #[test]
     fn a_flat_box_is_entered() {
-        let node = Node::new(&[(Child::Leaf(0), (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)))]);
+        let node = Node::new(&[(Child::Leaf(0), Aabb32::around([Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0)]))]);
         assert_eq!(entered(&node, &Ray::new(DVec3::new(0.3, 0.2, 1.7), Vec3::new(0.1, 0.2, -1.0))), 1);
         // In its plane, too: what lies in it decides.
         assert_eq!(entered(&node, &Ray::new(DVec3::new(-1.0, 0.2, 0.0), Vec3::X)), 1);
@@ -243,7 +240,7 @@ mod tests {
 
     #[test]
     fn only_boxes_of_the_interval_are_entered() {
-        let at = |z: f32| (Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 1.0, z + 1.0));
+        let at = |z: f32| Aabb32::around([Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 1.0, z + 1.0)]);
         let boxes = [5.0, 1.0, 9.0].map(|z| (Child::Leaf(z as u32), at(z)));
         let node = Node::new(&boxes);
         assert_eq!(node.children().collect::<Vec<_>>(), [5, 1, 9].map(Child::Leaf));
@@ -262,7 +259,7 @@ mod tests {
         let mut both = 0;
         for i in 0..20_000 {
             let (a, b, c) = (point(5 * i), point(5 * i + 1), point(5 * i + 2));
-            let (inner, outer) = ((a.min(b), a.max(b)), (a.min(b).min(c), a.max(b).max(c)));
+            let (inner, outer) = (Aabb32::around([a, b]), Aabb32::around([a, b, c]));
             let node = Node::new(&[(Child::Leaf(0), inner), (Child::Leaf(1), outer)]);
             let from = point(5 * i + 3) * 3.0 - Vec3::ONE;
             let ray = Ray::new(from.as_dvec3(), point(5 * i + 4) - from);
