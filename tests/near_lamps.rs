@@ -131,3 +131,21 @@ fn a_panel_under_a_slab_shines_through_as_without_photons() {
         agree(with, without, 0.01, &format!("gap {gap}"));
     }
 }
+
+/// A grey floor under a lamp of the same size at a gap of an eightieth of it, seen from between: the albedo, less what comes in at the
+/// rims, at most (gap / distance to the rim)² = 0.06 % of it.
+#[test]
+fn a_floor_close_under_a_lamp_has_its_albedo() {
+    let folder = tempfile::tempdir().unwrap();
+    cuboid(folder.path(), [0.01; 3]);
+    let floor = lamp("floor", [0.0; 3], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0]).replace("\"lamp\"\n", "\"grey\"\n");
+    let ceiling = lamp("ceiling", [0.0, 0.1, 0.0], [4.0, 0.0, 0.0], [0.0, 0.0, 4.0]);
+    let text = format!(
+        "unit = \"mm\"\n[camera]\nposition = [0, 0.09, 0]\nlook_at = [0.01, 0, 0]\nfov = 30\nresolution = [8, 8]\n{floor}{ceiling}\
+         [material.grey]\ntype = \"diffuse\"\nalbedo = 0.5\n[material.lamp]\ntype = \"emissive\"\nradiance = 1\n\
+         [[object]]\nname = \"far\"\nmesh = \"box.obj\"\ntransform = {{ translate = [0, 9, 0] }}\nmaterial = \"wax\"\n\
+         [material.wax]\ntype = \"translucent\"\nsigma_s = 900\nsigma_a = 0\ng = 0\neta = 1.3\n"
+    );
+    let found = mean(&load(&text, folder.path()), VolumePathOptions { photons: 0, ..OPTIONS }, 64);
+    agree(found, (0.5, 0.0), 0.01, "floor");
+}

@@ -35,9 +35,7 @@ pub struct CameraPath<'a> {
     pub other: f32,
     /// Times scattered in media.
     pub order: u32,
-    /// Whether a lamp that is met counts: not where one was asked for at the last surface.
-    pub meets_lamps: bool,
-    /// Density [1/sr] of the present direction, where suns were asked for at the last, Lambertian surface.
+    /// Density [1/sr] of the present direction, where lights were asked for at the last, Lambertian surface.
     pub by_cosine: Option<f32>,
     /// The body that was just left, and how.
     pub left: Option<(&'a Body, Option<Straight>)>,
@@ -129,8 +127,12 @@ impl<'a> CameraPath<'a> {
         }
     }
 
-    /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision before.
+    /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision or the Lambertian
+    /// surface before.
     fn share(&self, hit: &Hit, direction: Vec3) -> f32 {
+        if let Some(by_cosine) = self.by_cosine {
+            return by_cosine / (by_cosine + self.method.light.lights.pdf_angle(self.view.scene, hit, direction));
+        }
         let Some((body, Some(straight))) = &self.left else { return 1.0 };
         let lit = (*body, self.method.through(body));
         share_by_chance(self.view.scene, &self.method.light.lights, lit, straight, hit, direction)
@@ -148,10 +150,8 @@ impl<'a> CameraPath<'a> {
         let at = self.view.point(hit, direction);
         match self.view.scene.surface(hit.mesh) {
             Surface { emission: Some(_), .. } => {
-                if self.meets_lamps {
-                    let share = self.direct * self.share(hit, direction);
-                    self.add_lamp(hit, direction, share);
-                }
+                let share = self.direct * self.share(hit, direction);
+                self.add_lamp(hit, direction, share);
                 None
             }
             Surface { inside: None, bsdf, .. } => {
@@ -166,7 +166,7 @@ impl<'a> CameraPath<'a> {
                     return None;
                 }
                 let mu = -at.n_geometric.dot(direction);
-                (self.meets_lamps, self.by_cosine) = (true, None);
+                self.by_cosine = None;
                 if self.draws.number() < reflectance(body.eta, mu) {
                     let w = reflect(-direction, at.n_geometric);
                     return Some(Ray::new(at.leave(w), w));
@@ -211,21 +211,17 @@ impl<'a> CameraPath<'a> {
         self.spectrum.scale(albedo);
         let left = self.spectrum.value_outside().max();
         let lights = &self.method.light.lights;
-        if lights.has_emitters() {
-            let u = [self.draws.number(), self.draws.number(), self.draws.number()];
-            if let Some(arrival) = lights.sample_emitter(self.view.scene, at, u)
-                && self.open(&arrival)
-            {
-                self.add(self.spectrum.value_outside() * arrival.irradiance * (FRAC_1_PI * self.other));
+        for (there, suns) in [(lights.has_emitters(), false), (lights.has_suns(), true)] {
+            if !there {
+                continue;
             }
-        }
-        if lights.has_suns() {
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
-            if let Some(arrival) = lights.sample_sun(at, u)
+            let found = if suns { lights.sample_sun(at, u) } else { lights.sample_emitter(self.view.scene, at, u) };
+            if let Some(arrival) = found
                 && self.open(&arrival)
             {
                 // The balance heuristic [VG95] with the cosine by which the path goes on.
-                let share = arrival.pdf_angle / (arrival.pdf_angle + at.n.dot(arrival.w) * FRAC_1_PI);
+                let share = 1.0 / (1.0 + at.n.dot(arrival.w) * FRAC_1_PI / arrival.pdf_angle);
                 let light = arrival.irradiance * (FRAC_1_PI * share * self.other);
                 self.add(self.spectrum.value_outside() * light);
             }
@@ -234,7 +230,7 @@ impl<'a> CameraPath<'a> {
             return None;
         }
         let w = cosine_hemisphere(at.n, self.draws.pair());
-        (self.meets_lamps, self.by_cosine) = (false, Some(at.n.dot(w) * FRAC_1_PI));
+        self.by_cosine = Some(at.n.dot(w) * FRAC_1_PI);
         (at.n_geometric.dot(w) > 0.0).then(|| Ray::new(at.leave(w), w))
     }
 
@@ -253,7 +249,7 @@ impl<'a> CameraPath<'a> {
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let exit = exit?;
-        (self.meets_lamps, self.by_cosine) = (true, None);
+        self.by_cosine = None;
         self.left = Some((body, exit.straight));
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
@@ -357,7 +353,7 @@ pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, dire
         path.trace(Ray::new(at.leave(w), w));
     }
     (path.spectrum, path.draws) = (spectrum, draws);
-    (path.direct, path.other, path.order, path.meets_lamps) = (1.0, 1.0, 0, true);
+    (path.direct, path.other, path.order, path.by_cosine) = (1.0, 1.0, 0, None);
     if let Some(ray) = enter(path, body, hit, direction) {
         path.trace(ray);
     }

@@ -178,7 +178,6 @@ impl VolumePath {
             direct: 1.0,
             other: 1.0,
             order: 0,
-            meets_lamps: true,
             by_cosine: None,
             left: None,
             radiance: Rgb::BLACK,
