@@ -102,6 +102,11 @@ fn what_no_one_can_act_on_is_not_said() {
     assert_eq!(load(&whole, "", dark, "direct").warnings, Vec::<String>::new());
     let clear = load(&whole, "", "sigma_s_prime = 0.01\nsigma_a = 1e-4", "subsurface").warnings;
     assert!(clear.len() == 1 && clear[0].contains("it will look almost empty"), "{clear:#?}");
+    let glass = "sigma_s_prime = 0\nsigma_a = 0";
+    let said = load(&whole, "", glass, "subsurface").warnings;
+    assert!(said.len() == 1 && said[0].contains("no light comes back there"), "{said:#?}");
+    // Light goes through it.
+    assert_eq!(load(&whole, "", glass, "volume_path").warnings, Vec::<String>::new());
 }
 
 #[test]

@@ -214,7 +214,7 @@ impl ModelComparison {
                         let [low, high] = b.interval();
                         format!("{:.2e} ({low:.1e} to {high:.1e})", b.value)
                     }
-                    Ok(b) => format!("below {:.0e}", b.interval()[1]),
+                    Ok(b) => b.at_most(),
                     Err(_) => "no verdict".into(),
                 };
                 let judged = f.judgement.map(|j| (j.trimmed, j.all));

@@ -225,7 +225,7 @@ impl Convergence {
         let bias = match last.judgement.trimmed.bias {
             Some(_) if why_not(&last.judgement, &last.judgement.trimmed).is_some() => "no verdict".into(),
             Some(b) if b.is_seen() => cell(&Estimate { value: b.value, interval: Some(b.interval()) }),
-            Some(b) => format!("below {:.0e}", b.interval()[1]),
+            Some(b) => b.at_most(),
             None => "not told".into(),
         };
         let slope = self.fit_samples(curve);

@@ -154,7 +154,8 @@ fn by_nature(t: &Translucent, model: &dyn Bssrdf, untraceable: &Untraceable<'_>)
             false => format!("with single scattering beside it, at g = {g} and eta = {eta}"),
         };
         let remedy = if uncalibrated && keeps(Translucent { calibrated: true, ..clear.clone() }) {
-            "set calibrated = true, or take model `beam`".into()
+            let beam = keeps(Translucent { model: ModelName::BEAM, ..clear.clone() });
+            format!("set calibrated = true{}", if beam { ", or take model `beam`" } else { "" })
         } else {
             let standard = keeps(Translucent { model: ModelName::STANDARD, ..clear.clone() })
                 .then(|| "take model `standard`, which has all orders and no more than all light".to_string());
@@ -289,6 +290,14 @@ mod tests {
         }
         for (model, eta) in [(ModelName::STANDARD, 0.7), (ModelName::STANDARD, 1.9), (ModelName::BETTER, 1.3)] {
             assert_eq!(said(model, eta), "");
+        }
+        // Backwards, `beam` with single scattering beside it makes light too.
+        for (g, remedy) in [(0.0, "; set calibrated = true, or take model `beam`"), (-0.999, "; set calibrated = true")]
+        {
+            let mut t = of(ModelName::DIRECTIONAL, 0.0, 1.3);
+            t.medium.g = g;
+            let words = super::of(&t, &thick, &|| None).join("\n");
+            assert!(words.ends_with(remedy), "{words}");
         }
     }
 }

@@ -31,9 +31,10 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             said.push(format!("{head} is used by no object"));
         } else if let Some(t) = &scene.materials[i].surface.inside {
             let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
-            let model = models_are_used(file).then(|| outside_diffusion(t).into_iter().chain(first));
-            let all = nothing_there(t).into_iter().chain(model.into_iter().flatten());
-            said.extend(all.map(|what| format!("{head}: {what}")));
+            if models_are_used(file) {
+                let all = nothing_there(t).into_iter().chain(outside_diffusion(t)).chain(first);
+                said.extend(all.map(|what| format!("{head}: {what}")));
+            }
         }
     }
 }
@@ -43,7 +44,7 @@ fn models_are_used(file: &SceneFile) -> bool {
     file.method.name.is_none_or(|name| name == MethodName::Subsurface)
 }
 
-/// Channels of a medium that is none.
+/// Channels of a medium that is none: models have no light there, `volume_path` has clear glass.
 fn nothing_there(t: &Translucent) -> Option<String> {
     let sigma = t.medium.sigma_t_prime();
     let empty: Vec<&str> = (0..3).filter(|&c| sigma[c] <= 0.0).map(|c| CHANNELS[c]).collect();

@@ -27,6 +27,14 @@ impl Bias {
     pub fn interval(&self) -> [f64; 2] {
         [self.value - self.half_width, self.value + self.half_width].map(|v| v.max(0.0))
     }
+
+    /// What a table says of one that is not seen.
+    pub fn at_most(&self) -> String {
+        match self.interval()[1] {
+            most if most > 0.0 => format!("below {most:.0e}"),
+            _ => "none told".into(),
+        }
+    }
 }
 
 /// Variance of the reference's samples at a pixel over that of the film's, beyond which the film is taken not to have met light

@@ -1,5 +1,5 @@
 use super::super::{Film, Image, SelfError, Window};
-use super::{Judgement, Truth, brightness, judge};
+use super::{Bias, Judgement, Truth, brightness, judge};
 use crate::math::{Rgb, hash};
 
 /// Uniform in -0.5..0.5.
@@ -125,4 +125,12 @@ fn brightness_has_an_interval_that_holds() {
     // 95 of 100, 4 standard errors of 2.2 below.
     let held = held.count();
     assert!(held >= 87, "{held}");
+}
+
+/// A bound of 0 is none that can be written: chance has put the whole interval below it.
+#[test]
+fn a_bias_that_is_not_seen_has_a_bound_in_words() {
+    let bias = |value, half_width| Bias { value, half_width };
+    assert_eq!(bias(1e-6, 4e-6).at_most(), "below 5e-6");
+    assert_eq!(bias(-5e-6, 4e-6).at_most(), "none told");
 }
