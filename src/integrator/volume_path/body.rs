@@ -6,10 +6,11 @@ use super::spectrum::{Coefficients, Spectrum};
 use crate::geometry::{Clearance, SurfacePoint};
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
-use crate::optics::{HenyeyGreenstein, Medium, reflect, reflectance, refract};
+use crate::optics::{HenyeyGreenstein, Medium};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
 use crate::scene::Surface;
+use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
 
 /// A homogeneous medium in the closed mesh of one object. Its boundary is the triangles themselves.
@@ -208,17 +209,14 @@ impl Body {
                 }
                 Flight::Boundary(at, t) => {
                     spectrum.fly(t);
-                    let inwards = -at.n_geometric;
-                    let mu = -w.dot(inwards);
-                    if draws.number() >= reflectance(1.0 / self.eta, mu)
-                        && let Some(out) = refract(-w, inwards, 1.0 / self.eta)
-                    {
+                    let next = Boundary { eta: self.eta }.sample(&at, -w, [draws.number(), 0.0, 0.0])?.wi;
+                    let cosines = [w.dot(at.n_geometric), next.dot(at.n_geometric)];
+                    if cosines[1] > 0.0 {
                         spectrum.leave(&self.medium);
-                        let cosines = [mu, -out.dot(inwards)];
                         let straight = edge.map(|phase| Straight { phase, length: t, cosines });
-                        return Some(Exit { at, w: out, straight });
+                        return Some(Exit { at, w: next, straight });
                     }
-                    w = reflect(-w, inwards);
+                    w = next;
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);
                 }
                 Flight::Opaque(at, t, albedo) => {

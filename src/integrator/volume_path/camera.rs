@@ -13,10 +13,9 @@ use crate::light::{Arrival, Lights, emitted};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
-use crate::sampling::cosine_hemisphere;
 use crate::scene::{Orders, Surface};
+use crate::surface::Bsdf;
 use crate::tally::{Cause, Tally, WalkTally};
-use std::f32::consts::FRAC_1_PI;
 
 /// A path and what it has found.
 pub struct CameraPath<'a> {
@@ -36,7 +35,7 @@ pub struct CameraPath<'a> {
     /// Times scattered in media.
     pub order: u32,
     /// Density [1/sr] of the present direction, where lights were asked for at the last, Lambertian surface.
-    pub by_cosine: Option<f32>,
+    pub by_bsdf: Option<f32>,
     /// The body that was just left, and how.
     pub left: Option<(&'a Body, Option<Straight>)>,
     pub radiance: Rgb,
@@ -113,8 +112,8 @@ impl<'a> CameraPath<'a> {
     /// The share of a sun's light that a path meets by chance where suns, drawn with density `by_table` there, were asked
     /// for before.
     fn share_of_sun(&self, by_table: f32) -> f32 {
-        match (self.by_cosine, &self.left) {
-            (Some(by_cosine), _) => by_cosine / (by_cosine + by_table),
+        match (self.by_bsdf, &self.left) {
+            (Some(by_bsdf), _) => by_bsdf / (by_bsdf + by_table),
             (None, Some((body, Some(straight)))) => {
                 sun_share_by_chance((body, self.method.through(body)), straight, by_table)
             }
@@ -130,8 +129,8 @@ impl<'a> CameraPath<'a> {
     /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision or the Lambertian
     /// surface before.
     fn share(&self, hit: &Hit, direction: Vec3) -> f32 {
-        if let Some(by_cosine) = self.by_cosine {
-            return by_cosine / (by_cosine + self.method.light.lights.pdf_angle(self.view.scene, hit, direction));
+        if let Some(by_bsdf) = self.by_bsdf {
+            return by_bsdf / (by_bsdf + self.method.light.lights.pdf_angle(self.view.scene, hit, direction));
         }
         let Some((body, Some(straight))) = &self.left else { return 1.0 };
         let lit = (*body, self.method.through(body));
@@ -156,23 +155,18 @@ impl<'a> CameraPath<'a> {
             }
             Surface { inside: None, bsdf, .. } => {
                 self.left = None;
-                self.diffuse(&at, bsdf.albedo())
+                self.reflect(&at, -direction, &**bsdf)
             }
-            Surface { .. } => {
+            Surface { bsdf, .. } => {
                 self.left = None;
                 self.direct = self.other;
                 let body = self.method.bodies[hit.mesh as usize].as_ref()?;
                 if !self.faces(body, hit, direction) || self.other <= 0.0 {
                     return None;
                 }
-                let mu = -at.n_geometric.dot(direction);
-                self.by_cosine = None;
-                if self.draws.number() < reflectance(body.eta, mu) {
-                    let w = reflect(-direction, at.n_geometric);
-                    return Some(Ray::new(at.leave(w), w));
-                }
-                let w = refract(-direction, at.n_geometric, body.eta)?;
-                self.inside(body, &at, w)
+                self.by_bsdf = None;
+                let w = bsdf.sample(&at, -direction, [self.draws.number(), 0.0, 0.0])?.wi;
+                if w.dot(at.n_geometric) < 0.0 { self.inside(body, &at, w) } else { Some(Ray::new(at.leave(w), w)) }
             }
         }
     }
@@ -202,17 +196,15 @@ impl<'a> CameraPath<'a> {
         open
     }
 
-    fn diffuse(&mut self, at: &SurfacePoint, albedo: Rgb) -> Option<Ray> {
+    /// Asks for lights at an opaque surface, and goes on by its own sampling.
+    fn reflect(&mut self, at: &SurfacePoint, wo: Vec3, bsdf: &dyn Bsdf) -> Option<Ray> {
         self.direct = self.other;
         if self.other <= 0.0 {
             return None;
         }
-        let before = self.spectrum.value_outside().max();
-        self.spectrum.scale(albedo);
-        let left = self.spectrum.value_outside().max();
         let lights = &self.method.light.lights;
         for (there, suns) in [(lights.has_emitters(), false), (lights.has_suns(), true)] {
-            if !there {
+            if !there || bsdf.is_delta() {
                 continue;
             }
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
@@ -220,18 +212,23 @@ impl<'a> CameraPath<'a> {
             if let Some(arrival) = found
                 && self.open(&arrival)
             {
-                // The balance heuristic [VG95] with the cosine by which the path goes on.
-                let share = 1.0 / (1.0 + at.n.dot(arrival.w) * FRAC_1_PI / arrival.pdf_angle);
-                let light = arrival.irradiance * (FRAC_1_PI * share * self.other);
+                // The balance heuristic [VG95] with the direction in which the path goes on.
+                let share = 1.0 / (1.0 + bsdf.pdf(at, wo, arrival.w) / arrival.pdf_angle);
+                let light = bsdf.eval(at, wo, arrival.w) * arrival.irradiance * (share * self.other);
                 self.add(self.spectrum.value_outside() * light);
             }
         }
+        let (before, mut after) = (self.spectrum.value_outside().max(), self.spectrum);
+        after.scale(bsdf.albedo());
+        let left = after.value_outside().max();
         if left <= 0.0 || !survives(left / before, &mut self.spectrum, &mut self.draws) {
             return None;
         }
-        let w = cosine_hemisphere(at.n, self.draws.pair());
-        self.by_cosine = Some(at.n.dot(w) * FRAC_1_PI);
-        (at.n_geometric.dot(w) > 0.0).then(|| Ray::new(at.leave(w), w))
+        let [u, v] = self.draws.pair();
+        let next = bsdf.sample(at, wo, [u, v, 0.0])?;
+        self.spectrum.scale(next.weight);
+        self.by_bsdf = (!bsdf.is_delta()).then_some(next.pdf);
+        (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
     /// Through a body from `at`, refracted into `w`; the ray on which the path leaves it.
@@ -249,7 +246,7 @@ impl<'a> CameraPath<'a> {
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let exit = exit?;
-        self.by_cosine = None;
+        self.by_bsdf = None;
         self.left = Some((body, exit.straight));
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
@@ -353,7 +350,7 @@ pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, dire
         path.trace(Ray::new(at.leave(w), w));
     }
     (path.spectrum, path.draws) = (spectrum, draws);
-    (path.direct, path.other, path.order, path.by_cosine) = (1.0, 1.0, 0, None);
+    (path.direct, path.other, path.order, path.by_bsdf) = (1.0, 1.0, 0, None);
     if let Some(ray) = enter(path, body, hit, direction) {
         path.trace(ray);
     }

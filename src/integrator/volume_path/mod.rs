@@ -178,7 +178,7 @@ impl VolumePath {
             direct: 1.0,
             other: 1.0,
             order: 0,
-            by_cosine: None,
+            by_bsdf: None,
             left: None,
             radiance: Rgb::BLACK,
         }
