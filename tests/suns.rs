@@ -313,6 +313,9 @@ fn small_lights_behind_clear_bodies_are_said() {
         assert!(words.contains(word), "{word}: {words}");
     }
     assert!(said(&sunny(ball(glass, floor), 0.5)).contains("the bright part of the environment's picture"));
+    // Wide from where the ball is nearest, small from behind it.
+    let near = lamp(0.15).replace("centre = [0, 5, 0]", "centre = [0, 1.05, 0]");
+    assert!(said(&ball(glass, &near)).contains("light of \"lamp\" that comes through \"ball\""));
     // A wide lamp, a dense body, nothing to show the light, an even sky.
     for scene in [
         ball(glass, &lamp(2.0)),

@@ -136,4 +136,7 @@ fn a_flipped_lamp_that_shines_inwards_warns() {
     let flipped = load_with(&lamp("flip = true"), &[("lamp.obj", faces)], false).unwrap();
     warns(&flipped, &["it shines inwards; leave out flip = true, or --repair turns it"]);
     ok(&load_with(&lamp(""), &[("lamp.obj", faces)], false).unwrap());
+    // Around the camera it is meant.
+    let wide = "v -99 -99 -99\nv 300 -99 -99\nv -99 300 -99\nv -99 -99 300\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    ok(&load_with(&lamp("flip = true"), &[("lamp.obj", wide)], false).unwrap());
 }

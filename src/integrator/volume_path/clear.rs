@@ -63,13 +63,14 @@ fn receives(scene: &Scene, object: &Object) -> bool {
     }
 }
 
-/// Whether an object is a lamp that is seldom met from where `body` is.
+/// Whether an object is a lamp that is seldom met from somewhere in `body`: from the corner of its box that is farthest.
 fn is_small(scene: &Scene, lamp: &Object, body: &Object) -> bool {
     if !scene.materials[lamp.material].surface.shines() {
         return false;
     }
-    let middle = |o: &Object| o.mesh.bounds().map(|bounds| bounds.centre());
-    let (Some(a), Some(b)) = (middle(lamp), middle(body)) else { return false };
+    let (Some(own), Some(around)) = (lamp.mesh.bounds(), body.mesh.bounds()) else { return false };
+    let middle = own.centre();
+    let farthest = (around.lower - middle).abs().max((around.upper - middle).abs());
     let area: f64 = (0..lamp.mesh.triangles.len() as u32).map(|t| lamp.mesh.area(t)).sum();
-    area > 0.0 && area < SMALL * PI * a.distance_squared(b)
+    area > 0.0 && area < SMALL * PI * farthest.length_squared()
 }
