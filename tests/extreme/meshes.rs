@@ -335,7 +335,7 @@ fn with_normal(n: &str) -> String {
 #[test]
 fn zero_normals_warns() {
     // No direction: those triangles are shaded flat, which is said.
-    let shots = warns(&body(&with_normal("0 0 0")).unwrap(), &["12 of 12 triangles have no normals"]);
+    let shots = warns(&body(&with_normal("0 0 0")).unwrap(), &["12 of 12 triangles are shaded flat"]);
     same_pictures(&shots, &ok(&body(&cube()).unwrap()));
 }
 

@@ -26,7 +26,7 @@ fn a_thin_sheet_warns() {
     );
     let scene = scene.unwrap();
     assert!(scene.objects[0].findings.volume.unwrap() > 0.0);
-    warns(&scene, &["`standard` is a model of a half space", "0.002 units thick", "0.00404 transport mean free paths"]);
+    warns(&scene, &["`standard` is a model of a half space", "0.002 units thick", "0.0041 transport mean free paths"]);
 }
 
 /// Thinner than the steps of single precision near its corners: rays are traced in f64.
