@@ -12,7 +12,7 @@ use marmor::query::Backend;
 use std::fs;
 
 /// What a program and its libraries take anyway, more or less of it in memory.
-const ASIDE: f64 = 16e6;
+const ASIDE: f64 = 8e6;
 /// Told over taken, at the least and at the most.
 const FACTORS: [f64; 2] = [0.9, 1.3];
 
