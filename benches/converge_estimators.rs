@@ -41,14 +41,9 @@ fn options(estimator: Estimator, seed: u64) -> SubsurfaceOptions {
     SubsurfaceOptions {
         cache_samples: estimator.default_samples(),
         estimator,
-        cut_error: None,
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        spread: Spread::Seen,
         specular: false,
-        single: true,
-        light_samples: 1,
         seed,
+        ..Default::default()
     }
 }
 

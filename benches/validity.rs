@@ -7,7 +7,7 @@
 #[path = "../tests/support/pencils.rs"]
 mod pencils;
 
-use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOptions};
+use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOption, ModelOptions};
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::{FresnelMoments, Medium};
 use pencils::{Body, Shape, Sum};
@@ -121,7 +121,7 @@ impl Rings {
 /// Heads of columns, and the models below them.
 fn variants() -> impl Iterator<Item = (&'static str, ModelName, ModelOptions)> {
     ModelName::models().flat_map(|name| {
-        let variants = if name.takes("calibrated") { vec![false, true] } else { vec![false] };
+        let variants = if name.takes(ModelOption::Calibrated) { vec![false, true] } else { vec![false] };
         variants.into_iter().map(move |calibrated| {
             let options = ModelOptions { calibrated, ..ModelOptions::DEFAULT };
             (name.evidence(&options).unwrap_or(name.name()), name, options)

@@ -8,7 +8,6 @@ use marmor::light::Sky;
 use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
-use marmor::sampling::Points;
 use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
 use std::f64::consts::PI;
 use std::path::Path;
@@ -58,13 +57,10 @@ fn subsurface(entry: EntrySampling, seed: u64) -> SubsurfaceOptions {
         single: false,
         cache_samples: 2048,
         estimator: Estimator::All,
-        cut_error: None,
         spread: Spread::Area,
         entry,
-        points: Points::Sobol,
-        specular: true,
-        light_samples: 1,
         seed,
+        ..Default::default()
     }
 }
 

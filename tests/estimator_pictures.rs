@@ -2,13 +2,12 @@
 #![allow(clippy::unwrap_used)] // a scene that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
-use marmor::bssrdf::ModelName;
+use marmor::bssrdf::{ModelName, ModelOption};
 use marmor::film::{Film, Image, Window};
 use marmor::integrator::{Subsurface, SubsurfaceOptions, View};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Scene, SceneFile};
 use std::sync::atomic::AtomicBool;
 
 /// Pixels across a block.
@@ -49,13 +48,10 @@ fn method(scene: &Scene, estimator: Estimator, samples: u32) -> Subsurface {
         cache_samples: samples,
         estimator,
         cut_error: Some(0.2),
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        spread: Spread::Seen,
         specular: false,
         single: false,
-        light_samples: 1,
         seed: 3,
+        ..Default::default()
     };
     Subsurface::new(scene, options).unwrap()
 }
@@ -85,7 +81,7 @@ fn set(scene: &mut Scene, model: ModelName) {
         if let Some(t) = &mut material.surface.inside {
             let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
             t.model = model;
-            t.thickness = model.takes("thickness").then_some(10.0 * longest);
+            t.thickness = model.takes(ModelOption::Thickness).then_some(10.0 * longest);
         }
     }
 }

@@ -2,7 +2,7 @@
 //! 4: order (files and signals: tests/interrupted.rs). 5: honesty (see also tests/extreme/).
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
-use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, SingleScattering};
+use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOption, SingleScattering};
 use marmor::film::{Counts, Film, Image, Window};
 use marmor::integrator::{
     AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
@@ -180,7 +180,7 @@ fn set_model(scene: &mut Scene, model: ModelName) {
             t.model = model;
             // Some four mean free paths of the thinnest channel: a slab that every medium here allows.
             let longest = t.medium.sigma_t_prime().0.into_iter().map(|s| 1.0 / s).fold(0.0, f32::max);
-            t.thickness = model.takes("thickness").then_some(4.0 * longest);
+            t.thickness = model.takes(ModelOption::Thickness).then_some(4.0 * longest);
         }
     }
 }

@@ -10,8 +10,7 @@ use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::reflectance;
 use marmor::query::{self, Backend, RayQuery};
 use marmor::render::{self, Job};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Orders, Scene, SceneFile, Spread};
 use marmor::tally::{Tally, WalkTally};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -396,13 +395,10 @@ fn single_scattering_of_subsurface_is_that_of_the_paths() {
                 single,
                 cache_samples: 256,
                 estimator: Estimator::All,
-                cut_error: None,
-                entry: EntrySampling::Light,
-                points: Points::Sobol,
                 spread: Spread::Area,
                 specular: false,
-                light_samples: 1,
                 seed,
+                ..Default::default()
             };
             let method = Subsurface::new(&scene, options).unwrap();
             let mut film = Film::new(scene.camera.resolution, Window::full(scene.camera.resolution)).unwrap();

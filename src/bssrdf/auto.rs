@@ -1,12 +1,12 @@
 //! The model for a medium: what the validity chart of `optics` trusts most, or a slab where both faces count.
 
-use super::{ModelKind, ModelName};
+use super::{ModelKind, ModelName, ModelOption};
 use crate::optics::{ChannelOptics, Medium, Trust};
 use crate::words::{albedo, digits};
 
 /// Whichever [`choose`] finds best.
 pub(super) static MODEL: ModelKind = ModelKind {
-    takes: &["thickness"],
+    takes: &[ModelOption::Thickness],
     ..ModelKind::new("auto", |medium, options| choose(medium, options.thickness).name.build(medium, options))
 };
 

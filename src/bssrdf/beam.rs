@@ -5,7 +5,7 @@ use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::depth::DepthLaw;
 use super::exponential::{exp, exp_m1};
 use super::gather::{EntryColumns, Layout, Row};
-use super::{Bssrdf, Claims, Entry, Exit, KappaExtinction, ModelKind, ModelName};
+use super::{Bssrdf, Claims, Entry, Exit, KappaExtinction, ModelKind, ModelName, ModelOption};
 use crate::math::{DVec3, GaussLegendre, Level, Rgb, dispatch_at};
 use crate::optics::Medium;
 use std::f64::consts::{LOG2_E, PI};
@@ -20,7 +20,7 @@ const RANGE: f64 = 25.0;
 const LEAST_DISTANCE: f64 = 1e-9;
 
 pub(super) static MODEL: ModelKind = ModelKind {
-    takes: &["kappa-full"],
+    takes: &[ModelOption::KappaFull],
     evidence: |options| (options.kappa == KappaExtinction::Reduced).then_some("beam"),
     ..ModelKind::new("beam", |medium, options| {
         Ok(Box::new(PhotonBeamDiffusion::new(medium, options.exit_normalisation, options.kappa)))

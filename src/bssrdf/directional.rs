@@ -2,13 +2,13 @@
 
 use super::channel::{Boundary, ChannelMedium, to_finite};
 use super::exponential::{exp, exp_m1};
-use super::{Entry, Exit, ModelKind};
+use super::{Entry, Exit, ModelKind, ModelOption};
 use crate::math::{DVec3, GaussLegendre, Rgb};
 use crate::optics::{HalfSpace, Medium};
 use std::f64::consts::PI;
 
 pub(super) static MODEL: ModelKind = ModelKind {
-    takes: &["calibrated"],
+    takes: &[ModelOption::Calibrated],
     own_exit_factor: true,
     evidence: |options| Some(if options.calibrated { "calibrated" } else { "directional" }),
     ..ModelKind::new("directional", |medium, options| Ok(Box::new(DirectionalDipole::new(medium, options.calibrated))))

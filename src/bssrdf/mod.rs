@@ -38,7 +38,7 @@ pub use expected::{ExpectedError, Place, Unmeasured, expected_error, measured_al
 pub use gather::{EntryColumns, LEAST_COLUMNS, Layout, MOST_COLUMNS, Row};
 #[doc(hidden)]
 pub use model::all_models;
-pub use model::{KappaExtinction, ModelKind, ModelName, ModelOptions};
+pub use model::{KappaExtinction, ModelKind, ModelName, ModelOption, ModelOptions};
 pub use normalised::{NormalisedDiffusion, WidthFit};
 #[doc(hidden)]
 pub use partition::Partition;

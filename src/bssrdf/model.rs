@@ -9,8 +9,8 @@ use crate::optics::Medium;
 pub struct ModelKind {
     /// The name in scene files and on the command line.
     pub name: &'static str,
-    /// Options that it heeds beside the exit normalisation, as [`ModelOptions`] and `marmor eval` name them.
-    pub takes: &'static [&'static str],
+    /// What it heeds beside the exit normalisation.
+    pub takes: &'static [ModelOption],
     /// Whether it has the exit factor 1/(4 C_phi(1/η)) always.
     pub own_exit_factor: bool,
     /// The head of its columns in the table of measured errors; `None` where nothing has been measured.
@@ -35,6 +35,23 @@ pub enum KappaExtinction {
     /// σ_t, not reduced. For g > 0 nearer to the truth in the total: 1 to 3 % off at g = 0.8 and albedos from 0.9
     /// to 0.999, where the reduced one is 5 to 14 % low. The same for g = 0.
     Full,
+}
+
+/// What only some models heed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModelOption {
+    /// [`ModelOptions::thickness`].
+    Thickness,
+    /// [`ModelOptions::eta_far`].
+    EtaFar,
+    /// [`ModelOptions::calibrated`].
+    Calibrated,
+    /// [`ModelOptions::kappa`] in full.
+    KappaFull,
+    /// Albedo and length of a fit in place of a medium, see [`super::NormalisedDiffusion::from_albedo`].
+    Width,
+    /// Light that leaves by the far face, see [`super::Slab::transmitted`].
+    Transmitted,
 }
 
 /// What a model is made with beside its medium. Each heeds what [`ModelKind::takes`] says.
@@ -100,7 +117,7 @@ impl ModelName {
 
     /// The models of a half space: those that heed no thickness.
     pub fn half_spaces() -> impl Iterator<Item = Self> + Clone {
-        Self::models().filter(|name| !name.takes("thickness"))
+        Self::models().filter(|name| !name.takes(ModelOption::Thickness))
     }
 
     /// The name in scene files and on the command line.
@@ -108,8 +125,8 @@ impl ModelName {
         self.0.name
     }
 
-    /// Whether it heeds the option of this name.
-    pub fn takes(self, option: &str) -> bool {
+    /// Whether it heeds `option`.
+    pub fn takes(self, option: ModelOption) -> bool {
         self.0.takes.contains(&option)
     }
 

@@ -1,7 +1,7 @@
 //! Normalised diffusion.
 
 use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, left};
-use super::{Claims, ModelKind, ModelName};
+use super::{Claims, ModelKind, ModelName, ModelOption};
 use crate::error::{Error, Result};
 use crate::math::{Rgb, exp2};
 use crate::optics::{FresnelMoments, Medium, standard_total};
@@ -53,7 +53,7 @@ impl std::str::FromStr for WidthFit {
 }
 
 pub(super) static MODEL: ModelKind = ModelKind {
-    takes: &["width"],
+    takes: &[ModelOption::Width],
     evidence: |_| Some("normalised"),
     ..ModelKind::new("normalised", |medium, options| {
         Ok(Box::new(NormalisedDiffusion::new(medium, options.exit_normalisation)))

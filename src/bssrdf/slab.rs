@@ -4,7 +4,7 @@ use super::gather::BLOCK;
 use super::multipole::Multipole;
 use super::radial::{Batch, Formula, Radial, finite, in_mean_free_paths, left};
 use super::standard::length_log2;
-use super::{Bssrdf, Claims, Entry, Exit, ModelKind, ModelName};
+use super::{Bssrdf, Claims, Entry, Exit, ModelKind, ModelName, ModelOption};
 use crate::error::{Error, Result};
 use crate::math::{Level, Rgb, dispatch_at, times_exp2};
 use crate::optics::{FresnelMoments, Medium};
@@ -12,7 +12,7 @@ use crate::words::digits;
 use std::f64::consts::{LOG2_E, PI};
 
 pub(super) static MODEL: ModelKind = ModelKind {
-    takes: &["thickness", "eta_far", "transmitted"],
+    takes: &[ModelOption::Thickness, ModelOption::EtaFar, ModelOption::Transmitted],
     evidence: |_| Some("slab"),
     ..ModelKind::new("slab", |medium, options| {
         let thickness = options.thickness.ok_or_else(|| Error::scene("the model `slab` needs a `thickness`"))?;

@@ -1,7 +1,7 @@
 //! `marmor eval`.
 
 use super::stdout;
-use marmor::bssrdf::{KappaExtinction, ModelName, ModelOptions, WidthFit};
+use marmor::bssrdf::{KappaExtinction, ModelName, ModelOption, ModelOptions, WidthFit};
 use marmor::report::{Batch, BatchOptions};
 use marmor::{Error, Result};
 use std::io::{self, BufRead, Read, Write};
@@ -61,17 +61,17 @@ const BUFFER: usize = 1 << 18;
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let refuse = |given: bool, option: &str| {
+    let refuse = |given: bool, name: &str, option: ModelOption| {
         if given && !args.model.takes(option) {
             let takers: Vec<&str> = ModelName::models().filter(|m| m.takes(option)).map(ModelName::name).collect();
-            return Err(Error::usage(format!("--{option} goes with --model {}", takers.join(" or "))));
+            return Err(Error::usage(format!("--{name} goes with --model {}", takers.join(" or "))));
         }
         Ok(())
     };
-    refuse(args.calibrated, "calibrated")?;
-    refuse(args.kappa_full, "kappa-full")?;
-    refuse(args.transmitted, "transmitted")?;
-    refuse(args.width.is_some(), "width")?;
+    refuse(args.calibrated, "calibrated", ModelOption::Calibrated)?;
+    refuse(args.kappa_full, "kappa-full", ModelOption::KappaFull)?;
+    refuse(args.transmitted, "transmitted", ModelOption::Transmitted)?;
+    refuse(args.width.is_some(), "width", ModelOption::Width)?;
     let options = BatchOptions {
         model: args.model,
         made: ModelOptions {

@@ -2,7 +2,7 @@
 
 use super::stdout;
 use clap::builder::NonEmptyStringValueParser;
-use marmor::bssrdf::{ModelName, ModelOptions};
+use marmor::bssrdf::{ModelName, ModelOption, ModelOptions};
 use marmor::film::{check_replaceable, write_atomically};
 use marmor::math::Rgb;
 use marmor::optics::{self, Measured, Medium};
@@ -69,7 +69,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     for name in models {
         let model = name.build(&medium, &options).map_err(|e| Error::usage(e.to_string()))?;
         let (name, variant) = (model.name(), if args.calibrated { ", calibrated" } else { "" });
-        let variant = if name.takes("calibrated") { variant } else { "" };
+        let variant = if name.takes(ModelOption::Calibrated) { variant } else { "" };
         profile.add(&format!("{}{variant}", name.name()), &*model);
     }
     match args.output.as_deref() {

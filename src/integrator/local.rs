@@ -1,7 +1,7 @@
 //! The shape of a body around a place, and how far models can be trusted there.
 
 use super::View;
-use crate::bssrdf::{ExpectedError, ModelName, ModelOptions, Place, Unmeasured, expected_error};
+use crate::bssrdf::{ExpectedError, ModelName, ModelOption, ModelOptions, Place, Unmeasured, expected_error};
 use crate::geometry::SurfacePoint;
 use crate::math::{Vec3, frame};
 use crate::optics::{ChannelOptics, Medium};
@@ -39,8 +39,8 @@ impl Candidate {
         let model = material.build().map_or(material.model, |model| model.name());
         Self {
             model,
-            calibrated: material.calibrated && model.takes("calibrated"),
-            thickness: material.thickness.filter(|_| model.takes("thickness")),
+            calibrated: material.calibrated && model.takes(ModelOption::Calibrated),
+            thickness: material.thickness.filter(|_| model.takes(ModelOption::Thickness)),
         }
     }
 

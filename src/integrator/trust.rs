@@ -2,7 +2,7 @@
 
 use super::View;
 use super::local::{Candidate, Local, LocalShape};
-use crate::bssrdf::{ExpectedError, ModelName, Place, Unmeasured, expected_error};
+use crate::bssrdf::{ExpectedError, ModelName, ModelOption, Place, Unmeasured, expected_error};
 use crate::geometry::Mesh;
 use crate::optics::FresnelMoments;
 use crate::scene::{ObstacleKind, Translucent};
@@ -260,7 +260,7 @@ fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
 /// Thickness [transport mean free paths of `path`] above which a flat sheet is within the tolerance of a model that knows no
 /// thickness.
 fn trusted_from(shape: &LocalShape, candidate: Candidate, tolerance: f64, path: f64) -> Option<f64> {
-    if candidate.model.takes("thickness") {
+    if candidate.model.takes(ModelOption::Thickness) {
         return None;
     }
     let wrong = |paths: f64| {

@@ -1,7 +1,7 @@
 //! Rows of a CSV in, the same rows with S_d out: the models' rendering code for scripts and tests.
 
 use super::batch_model::{BatchOptions, Inputs, Place, Prepared, Substance};
-use crate::bssrdf::ModelName;
+use crate::bssrdf::{ModelName, ModelOption};
 use crate::error::did_you_mean;
 use crate::{Error, Result};
 use std::collections::HashMap;
@@ -153,7 +153,7 @@ impl Columns {
                 0
             })
         };
-        let profile = model.takes("width") && at("sigma_s").is_none() && at("A").is_some();
+        let profile = model.takes(ModelOption::Width) && at("sigma_s").is_none() && at("A").is_some();
         let (substance, eta) = if profile {
             (SubstanceColumns::Profile(["A", "l"].map(&mut need)), at("eta"))
         } else {
@@ -166,8 +166,8 @@ impl Columns {
             let either = at("r").map_or("r` (or `x,y,z,nix,niy,niz,nox,noy,noz,wx,wy,wz`)", |_| "r");
             PlaceColumns::Plane(need(either))
         };
-        let two_faces = model.takes("eta_far");
-        let thickness = at("thickness").filter(|_| model.takes("thickness"));
+        let two_faces = model.takes(ModelOption::EtaFar);
+        let thickness = at("thickness").filter(|_| model.takes(ModelOption::Thickness));
         let thickness = if two_faces { Some(need("thickness")) } else { thickness };
         let eta_far = at("eta_far").filter(|_| two_faces);
         if missing.is_empty() {

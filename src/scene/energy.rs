@@ -2,7 +2,7 @@
 //! render, with the factor and a remedy.
 
 use super::{Object, Translucent};
-use crate::bssrdf::{Bssrdf, ModelName, Place, SingleScattering, expected_error};
+use crate::bssrdf::{Bssrdf, ModelName, ModelOption, Place, SingleScattering, expected_error};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, Medium};
 use crate::words::{digits, percent, short};
@@ -84,7 +84,7 @@ fn remedy(other: Option<String>, untraceable: &Untraceable<'_>) -> String {
 
 /// A model of a half space lets light out through both faces of a sheet as if each were the only one.
 fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
-    if model.name().takes("thickness") {
+    if model.name().takes(ModelOption::Thickness) {
         return None;
     }
     let (eta, optics) = (f64::from(t.medium.eta), ChannelOptics::of(&t.medium));
@@ -147,7 +147,7 @@ fn by_nature(t: &Translucent, model: &dyn Bssrdf, untraceable: &Untraceable<'_>)
         let keeps = |other: Translucent| {
             other.build().is_ok_and(|model| f64::from(furnace(&other.medium, &*model).max()) <= 1.0 + excess)
         };
-        let uncalibrated = model.name().takes("calibrated") && !t.calibrated;
+        let uncalibrated = model.name().takes(ModelOption::Calibrated) && !t.calibrated;
         let why = match model.claims().first_order {
             _ if uncalibrated => "as published".to_string(),
             true => format!("at g = {g} and eta = {eta}"),
@@ -176,7 +176,7 @@ fn furnace(medium: &Medium, model: &dyn Bssrdf) -> Rgb {
 
 /// A slab of another thickness than the body's.
 fn other_slab(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
-    let told = f64::from(t.thickness.filter(|_| model.name().takes("thickness"))?);
+    let told = f64::from(t.thickness.filter(|_| model.name().takes(ModelOption::Thickness))?);
     let ratio = told / shape.thickness;
     (!(1.0 / OTHER_SLAB..=OTHER_SLAB).contains(&ratio)).then(|| {
         format!(

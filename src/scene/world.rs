@@ -1,7 +1,7 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
 use super::{Camera, Environment, Insides, ObstacleKind};
-use crate::bssrdf::{Bssrdf, ModelName, ModelOptions, choose};
+use crate::bssrdf::{Bssrdf, ModelName, ModelOption, ModelOptions, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
@@ -167,8 +167,8 @@ impl Translucent {
         let name = self.model.name();
         match self.thickness {
             _ if self.model == ModelName::AUTO => choose(&self.medium, self.thickness).to_string(),
-            _ if self.calibrated && self.model.takes("calibrated") => format!("{name} (calibrated)"),
-            Some(thickness) if self.model.takes("thickness") => format!("{name} ({thickness} unit thick)"),
+            _ if self.calibrated && self.model.takes(ModelOption::Calibrated) => format!("{name} (calibrated)"),
+            Some(thickness) if self.model.takes(ModelOption::Thickness) => format!("{name} ({thickness} unit thick)"),
             _ => name.into(),
         }
     }

@@ -3,7 +3,7 @@
 //! absorption.
 
 use super::harness::{BALL, backends, render};
-use marmor::bssrdf::{ModelName, Radial, SingleScattering};
+use marmor::bssrdf::{ModelName, ModelOption, Radial, SingleScattering};
 use marmor::integrator::{Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, GaussLegendre, Rgb, Vec3};
 use marmor::optics::{Medium, transmittance};
@@ -180,7 +180,7 @@ pub fn in_all_models(text: &str, of: Of) {
         let model = t.build().unwrap();
         let most = most(t);
         // The curvature of a ball brings no more light than a plane, but for edges between facets.
-        let known = if name.takes("thickness") { None } else { model.radial() };
+        let known = if name.takes(ModelOption::Thickness) { None } else { model.radial() };
         let expected = known.map(|radial| of_distance(&scene, radial));
         let first_order = model.claims().first_order;
         let lecture = [Estimator::All, Estimator::Notes, Estimator::Thinned];

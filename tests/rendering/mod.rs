@@ -6,8 +6,7 @@ use marmor::film::{Film, Window};
 use marmor::integrator::{Integrator, Subsurface, SubsurfaceOptions, View};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job, Observer};
-use marmor::sampling::Points;
-use marmor::scene::{EntrySampling, Estimator, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Scene, SceneFile};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
@@ -38,20 +37,9 @@ pub fn backends() -> impl Iterator<Item = Backend> {
     Backend::ALL.into_iter().filter(|b| b.is_built_in())
 }
 
-/// The default method with `cache_samples` a pass.
+/// The default method with `cache_samples` a pass, without light scattered once.
 pub fn options(estimator: Estimator, cache_samples: u32, seed: u64) -> SubsurfaceOptions {
-    SubsurfaceOptions {
-        single: false,
-        cache_samples,
-        estimator,
-        cut_error: None,
-        spread: Spread::Seen,
-        entry: EntrySampling::Light,
-        points: Points::Sobol,
-        specular: true,
-        light_samples: 1,
-        seed,
-    }
+    SubsurfaceOptions { single: false, cache_samples, estimator, seed, ..Default::default() }
 }
 
 /// The same for `scene`.

@@ -107,7 +107,8 @@ impl Source {
         (yielding.is_normal()).then_some(Plan { emission, yielding })
     }
 
-    /// The pass's photons, in cells; `None` where no light comes to the body. Which thread traces which photon does not matter: each is a function of its number.
+    /// The pass's photons, in cells; `None` where no light comes to the body. Which thread traces which photon does not matter: each
+    /// is a function of its number.
     pub fn trace(&self, view: View<'_>, body: &Body, lights: &Lights, pass: u32, tally: &mut Tally) -> Option<Cells> {
         let plan = self.plan(view, body, lights)?;
         let turn = Turn::of(self.seed, pass);

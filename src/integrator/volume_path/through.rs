@@ -330,6 +330,7 @@ mod tests {
         let method = VolumePath::new(&scene, OPTIONS).unwrap();
         let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
         let through = method.through(body);
+        let from = ((body, through.unwrap()), lights, Drawn::Lamps);
         let (mut points, mut chance) = (Mean::default(), Mean::default());
         let (mut found, mut tally) = (Vec::new(), Tally::default());
         for i in 0..samples {
@@ -354,15 +355,7 @@ mod tests {
             chance.add(lucky[0]);
             // Far less noisy, but slower.
             if i % 12 == 0 {
-                let light = drawn_light(
-                    view,
-                    ((body, through.unwrap()), lights, Drawn::Lamps),
-                    (x, w),
-                    &spectrum,
-                    &mut found,
-                    &mut draws,
-                    &mut tally,
-                );
+                let light = drawn_light(view, from, (x, w), &spectrum, &mut found, &mut draws, &mut tally);
                 points.add(light[0] + lucky[1]);
             }
         }
@@ -409,22 +402,14 @@ mod tests {
             let view = View { scene: &scene, rays: &*rays };
             let method = VolumePath::new(&scene, OPTIONS).unwrap();
             let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
-            let through = method.through(body);
+            let from = ((body, method.through(body).unwrap()), lights, Drawn::Lamps);
             let (mut found, mut tally, mut most) = (Vec::new(), Tally::default(), 0.0_f32);
             for i in 0..100_000 {
                 let mut draws = Draws::new(&[], i);
                 let x = draws.direction().as_dvec3() * 0.98 - scene.centre;
                 let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
                 let w = draws.direction();
-                let light = drawn_light(
-                    view,
-                    ((body, through.unwrap()), lights, Drawn::Lamps),
-                    (x, w),
-                    &spectrum,
-                    &mut found,
-                    &mut draws,
-                    &mut tally,
-                );
+                let light = drawn_light(view, from, (x, w), &spectrum, &mut found, &mut draws, &mut tally);
                 most = most.max(light.max() / found.len().max(1) as f32);
             }
             println!("{medium}: {most}");
