@@ -20,7 +20,8 @@ fn the_library_gives_the_pictures_of_the_command_line() {
     let folder = folder(&scene());
     let file = SceneFile::read(&folder.path().join("scene.toml")).unwrap();
     let crop = Window { x0: 3, y0: 5, x1: 30, y1: 28 };
-    let default = Options { backend: Some(Backend::Bvh), ..Options::default() };
+    let backend = Backend::preferred();
+    let default = Options { backend: Some(backend), ..Options::default() };
     let cases = [
         ("", default),
         ("--seed 9 --spp 2", Options { seed: Some(9), spp: Some(2), ..default }),
@@ -34,7 +35,7 @@ fn the_library_gives_the_pictures_of_the_command_line() {
     ];
     for (words, options) in cases {
         let words: Vec<&str> = words.split_whitespace().collect();
-        let call = ["render", "scene.toml", "--backend", "bvh", "--layers", "variance", "-o", "picture.exr"];
+        let call = ["render", "scene.toml", "--backend", backend.name(), "--layers", "variance", "-o", "picture.exr"];
         let ran = marmor(folder.path(), &[&call, &words[..]].concat());
         assert!(ran.status.success(), "{words:?}: {}", text(&ran.stderr));
         let defined: Vec<&str> = words.iter().copied().filter(|word| word.contains('=')).collect();

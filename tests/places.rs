@@ -178,7 +178,7 @@ fn what_f32_would_do() {
         let mut scene = place.scene(medium);
         [Precision::Double, Precision::Single].map(|precision| {
             scene.objects.iter_mut().for_each(|o| o.mesh.precision = precision);
-            traced(&scene, place, Backend::Bvh, paths)
+            traced(&scene, place, Backend::preferred(), paths)
         })
     };
     let tell = |what: String, [f64s, f32s]: [[(f64, f64); 2]; 2]| {
