@@ -4,7 +4,7 @@ use super::{Cache, CachedSample, Density};
 use crate::bssrdf::{Bssrdf, Entry};
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::light::{Arrival, Lights, emitted};
-use crate::math::Rgb;
+use crate::math::{Rgb, Vec3};
 use crate::optics::{refract, transmittance};
 use crate::query::Ray;
 use crate::sampling::CacheStream;
@@ -23,6 +23,20 @@ pub struct Receiver {
     pub model: Box<dyn Bssrdf>,
     /// Its relative index of refraction.
     pub eta: f32,
+}
+
+impl Receiver {
+    /// Light as it enters at `at`, flat as the triangle it lies on, seen from there in the unit direction `w`: `irradiance` times
+    /// `weight` [unit²] before the boundary, `u` in [0, 1) for the depth. `None` where it is totally reflected.
+    pub fn enters(&self, at: &SurfacePoint, w: Vec3, (irradiance, weight): (Rgb, f32), u: f32) -> Option<CachedSample> {
+        let refracted = refract(w, at.n, self.eta)?;
+        let flux = irradiance * (transmittance(self.eta, w.dot(at.n)) * weight);
+        (!flux.is_black()).then(|| CachedSample {
+            entry: Entry { x: (at.x - self.table.centre()).as_vec3(), n: at.n, w: refracted },
+            depth: self.model.sample_depth(u),
+            flux,
+        })
+    }
 }
 
 /// How directions of entering light are picked.
@@ -135,7 +149,7 @@ impl Filler<'_> {
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         let at = SurfacePoint { n: at.n_geometric, ..at };
         let (arrival, open) = self.arrival(&at, [u[0], u[1], u[2], u[3]], tally)?;
-        let sample = self.transmitted(&at, weight, &arrival, u[4])?;
+        let sample = self.body.enters(&at, arrival.w, (arrival.irradiance, weight), u[4])?;
         let shadow = Shadow { ray: arrival.shadow, light: arrival.light };
         if let (true, Some(light)) = (open, arrival.light) {
             tally.rays.lights.meet(light);
@@ -196,20 +210,29 @@ impl Filler<'_> {
                 if let Some(light) = light {
                     tally.rays.lights.meet(light);
                 }
-                lit.extend(self.transmitted(
-                    &at,
-                    weight,
-                    &Arrival { w, irradiance: radiance * PI, pdf_angle: at.n.dot(w) / PI, shadow: ray, light },
-                    u[4],
-                ));
+                lit.extend(self.body.enters(&at, w, (radiance * PI, weight), u[4]));
             }
         }
         lit
     }
 
+    /// Light that comes straight from the lights to point number `number`: the point, the unit direction to the light, and flux
+    /// before the boundary over the density of all that was picked [radiance unit x sr x unit²].
+    pub fn arriving(&self, number: u64, tally: &mut Tally) -> Option<(SurfacePoint, Vec3, Rgb)> {
+        let (at, weight, u) = self.point(number);
+        let (arrival, open) = self.arrival(&at, [u[0], u[1], u[2], u[3]], tally)?;
+        if !open {
+            tally.rays.shadow += 1;
+            if self.view.rays.occluded(&arrival.shadow) {
+                return None;
+            }
+        }
+        Some((at, arrival.w, arrival.irradiance * weight))
+    }
+
     /// Point number `number` of the surface, flat as the triangle it lies on, area over its density, four numbers for the
     /// light and one for the depth.
-    fn point(&self, number: u64) -> (SurfacePoint, f32, [f32; 5]) {
+    pub fn point(&self, number: u64) -> (SurfacePoint, f32, [f32; 5]) {
         let (pick, u) = self.stream.numbers(number);
         let (pick, weight) = self.density.place(pick);
         let at = self.body.table.sample(pick, [u[0], u[1]]);
@@ -217,17 +240,5 @@ impl Filler<'_> {
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         point.n = point.n_geometric;
         (point, weight * self.body.table.area() as f32, [u[2], u[3], u[4], u[5], u[6]])
-    }
-
-    /// Refracts an arrival into the medium; `weight` is one over the density of the point [unit²]. `None` where it is totally reflected.
-    fn transmitted(&self, at: &SurfacePoint, weight: f32, arrival: &Arrival, u: f32) -> Option<CachedSample> {
-        let w = refract(arrival.w, at.n, self.body.eta)?;
-        let t12 = transmittance(self.body.eta, arrival.w.dot(at.n));
-        let flux: Rgb = arrival.irradiance * (t12 * weight);
-        (!flux.is_black()).then(|| CachedSample {
-            entry: Entry { x: (at.x - self.body.table.centre()).as_vec3(), n: at.n, w },
-            depth: self.body.model.sample_depth(u),
-            flux,
-        })
     }
 }

@@ -22,7 +22,7 @@ pub use density::Density;
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Gatherer, PLAIN_SUM};
 pub use fill::{Directions, Filler, Receiver, Shadow};
-pub use near::{GatherPoint, NearField};
+pub use near::{GatherPoint, NearField, Step};
 pub use notes::notes;
 pub use plan::{Plan, SubsurfaceOptions};
 pub use survey::{Seen, Survey, seen};
@@ -30,6 +30,7 @@ pub use thinned::{Thinning, thinned};
 pub use tree::{Node, Tree};
 
 /// The cached samples of one object and one pass. Samples that met no light are not stored, but count.
+#[derive(Clone)]
 pub struct Cache {
     /// Samples that carry light.
     pub lit: Vec<CachedSample>,

@@ -3,9 +3,11 @@
 
 use super::{CachedSample, Columns, Envelope, Filler, Shadow};
 use crate::bssrdf::{Exit, Layout, Partition};
+use crate::geometry::SurfacePoint;
 use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
+use crate::scene::View;
 use crate::tally::{Clock, Tally};
 use std::f32::consts::TAU;
 use std::time::Instant;
@@ -97,6 +99,17 @@ struct Found {
     place: DVec3,
     /// Its own place is nowhere: 0.
     sample: CachedSample,
+}
+
+/// A place that [`NearField::step`] leads to.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Where, before rounding.
+    pub place: DVec3,
+    /// The same point of the surface, its normals outwards.
+    pub at: SurfacePoint,
+    /// One over its density [unit²].
+    pub weight: f32,
 }
 
 /// An exit and its axes, the normal first.
@@ -294,6 +307,44 @@ impl NearField {
             }
         }
         found
+    }
+
+    /// The near part of S_d from one place to another, by chance: a place on the surface that a line near `from` meets, in the units
+    /// of a sum over samples that are weighted by the number beside it, one over its density [unit²]. `None` where it meets none.
+    pub fn step(
+        &self,
+        view: View<'_>,
+        object: u32,
+        (from, n): (DVec3, Vec3),
+        mut numbers: PixelStream,
+        tally: &mut Tally,
+    ) -> Option<Step> {
+        let frame = frame(n);
+        let middle = Middle { x: from, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame * a) };
+        let all: f32 = AXES.iter().sum();
+        let [u, pick] = numbers.next_2d();
+        let axis = if u * all < AXES[0] { 0 } else { 1 + usize::from(u * all >= AXES[0] + AXES[1]) };
+        let mut line = self.line(&middle, axis, numbers)?;
+        let square = f64::from(self.radius) * f64::from(self.radius);
+        let mesh = &view.scene.objects[object as usize].mesh;
+        let mut found = Vec::new();
+        for _ in 0..MOST_HITS {
+            tally.rays.bounce += 1;
+            let Some(hit) = view.rays.closest(&line.ray) else { break };
+            line.ray.t_min = hit.t.max(line.ray.t_min.next_up());
+            let again = line.last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
+            if again || hit.mesh != object {
+                continue;
+            }
+            let place = mesh.crossing(hit.triangle, line.through, line.ray.direction.as_dvec3());
+            if let Some(place) = place.filter(|p| p.distance_squared(from) <= square) {
+                found.push((place, hit));
+            }
+        }
+        let &(place, hit) = found.get((pick * found.len() as f32) as usize)?;
+        let at = view.outwards(&hit);
+        let density = self.density(std::slice::from_ref(&middle), place, at.n_geometric) / all;
+        (density > 0.0).then(|| Step { place, at, weight: found.len() as f32 / density })
     }
 
     /// The square of a radius with cumulative chance `u`, evenly by area within its ring, where the outermost one is 1.

@@ -2,14 +2,14 @@
 //! way of a pass.
 
 use super::{
-    CachedSample, Density, Directions, Envelope, Filler, GatherPoint, Gatherer, NearField, Receiver, Scratch, Seen,
-    Survey, Tuning,
+    Cache, CachedSample, Columns, Density, Directions, Envelope, Filler, GatherPoint, Gatherer, NearField, Receiver,
+    Scratch, Seen, Survey, Tuning,
 };
-use crate::bssrdf::{Exit, Partition};
+use crate::bssrdf::{Entry, Exit, Partition};
 use crate::error::Result;
 use crate::geometry::AreaTable;
 use crate::light::Lights;
-use crate::math::Rgb;
+use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
 use crate::sampling::{CacheStream, Points, Turn};
 use crate::scene::{EntrySampling, Estimator, Scene, Spread, View};
@@ -37,6 +37,8 @@ pub struct SubsurfaceOptions {
     pub single: bool,
     /// Samples of each kind of light per diffuse point.
     pub light_samples: u32,
+    /// Surfaces that light may go over on its way to a body and between bodies; 0: straight from the lights alone.
+    pub bounces: u32,
     /// Seed of the render.
     pub seed: u64,
 }
@@ -54,6 +56,7 @@ impl Default for SubsurfaceOptions {
             specular: true,
             single: true,
             light_samples: 1,
+            bounces: u32::MAX,
             seed: 0,
         }
     }
@@ -134,7 +137,8 @@ impl Plan {
         &self.medium
     }
 
-    fn filler<'a>(
+    /// What samples this object, by the numbers of `stream`.
+    pub fn filler<'a>(
         &'a self,
         view: View<'a>,
         lights: &'a Lights,
@@ -160,11 +164,10 @@ impl Plan {
         });
     }
 
-    /// Fills the cache of pass number `pass` and makes it ready for gathering.
-    pub fn fill(&self, view: View<'_>, lights: &Lights, pass: u32, tally: &mut Tally) -> Gatherer {
-        let survey = self.survey.get_or_init(Survey::none);
+    /// Fills the cache of pass number `pass` with light straight from the lights.
+    pub fn fill(&self, view: View<'_>, lights: &Lights, pass: u32, tally: &mut Tally) -> Cache {
         let turn = Turn::of(self.options.seed, pass);
-        let filler = self.filler(view, lights, &self.streams[turn.stream], &survey.density);
+        let filler = self.filler(view, lights, &self.streams[turn.stream], self.density());
         let first = u64::from(turn.number) * u64::from(self.samples);
         let start = std::time::Instant::now();
         let mut cache = filler.fill(first, self.samples, tally);
@@ -174,7 +177,17 @@ impl Plan {
         tally.gather.non_finite += (all - cache.lit.len()) as u64;
         tally.gather.samples += u64::from(self.samples);
         tally.gather.lit += cache.lit.len() as u64;
-        let tuning = self.tuning(survey, pass);
+        cache
+    }
+
+    /// Where samples are spent, as the survey says.
+    pub fn density(&self) -> &Density {
+        &self.survey.get_or_init(Survey::none).density
+    }
+
+    /// Makes a cache of pass number `pass` ready for gathering.
+    pub fn ready(&self, cache: Cache, pass: u32, tally: &mut Tally) -> Gatherer {
+        let tuning = self.tuning(self.survey.get_or_init(Survey::none), pass);
         let ready = || Gatherer::new(self.options.estimator, cache, &*self.body.model, tuning);
         Clock::time(&mut tally.clock.tree, ready)
     }
@@ -192,10 +205,9 @@ impl Plan {
         }
     }
 
-    /// ∫∫ S_d T12 L_i cosθ_i dω dA at each of `points`, into `sums`.
-    pub fn gather(
+    /// The sum over the cache at each of `points`, into `sums`.
+    pub fn sum(
         &self,
-        (view, lights): (View<'_>, &Lights),
         gatherer: &Gatherer,
         points: &[GatherPoint],
         scratch: &mut Scratch,
@@ -208,10 +220,37 @@ impl Plan {
         Clock::time(&mut tally.clock.gather, || {
             gatherer.gather(kernel, &exits, &keys, scratch, &mut tally.gather, sums);
         });
+    }
+
+    /// ∫∫ S_d T12 L_i cosθ_i dω dA at each of `points`, into `sums`.
+    pub fn gather(
+        &self,
+        (view, lights): (View<'_>, &Lights),
+        gatherer: &Gatherer,
+        points: &[GatherPoint],
+        scratch: &mut Scratch,
+        tally: &mut Tally,
+        sums: &mut Vec<Rgb>,
+    ) {
+        self.sum(gatherer, points, scratch, tally, sums);
         if let Some(near) = &self.near {
             let even = Density::even();
             near.add(&self.filler(view, lights, &self.streams[0], &even), points, tally, sums);
         }
+    }
+}
+
+impl Plan {
+    /// What the near part of S_d leaves of light that enters by `sample`, whose own place is nowhere, and leaves by `exit`, the way
+    /// from the exit to the entry being `way` [unit]: radiance under the boundary for a flux.
+    pub fn near_part(&self, near: &NearField, exit: &Exit, sample: &CachedSample, way: Vec3, tally: &mut Tally) -> Rgb {
+        let model = &*self.body.model;
+        let moved = CachedSample { entry: Entry { x: way, ..sample.entry }, ..*sample };
+        let mut columns = Columns::new(model.layout());
+        columns.refill(model, std::iter::once(&moved));
+        let mut value = [[0.0; 3]];
+        tally.gather.clamped += columns.sum(model, &[Exit { x: Vec3::ZERO, ..*exit }], near.partition, &mut value);
+        Rgb::from_fn(|c| value[0][c] as f32)
     }
 }
 

@@ -4,6 +4,7 @@
 mod ambient_occlusion;
 mod direct;
 mod first_order;
+mod indirect;
 mod local;
 mod lost;
 mod met;

@@ -1,23 +1,25 @@
 //! Translucent surfaces: light gathered from a cache of transmitted-light samples, leaving through the boundary.
 
 use super::direct::lambertian_albedos;
+use super::indirect::Indirect;
 use super::parts::of_cache;
 use super::shade::DirectLight;
 use super::single::Single;
+use super::volume_path::{Asked, Modelled, Scratch as PathScratch};
 use super::{CameraRay, Integrator, KnownLights, Part, camera_hits};
 use crate::bssrdf::Exit;
-use crate::cache::{GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, seen};
+use crate::cache::{Cache, GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, seen};
 use crate::error::Result;
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Solid, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::memory;
-use crate::optics::{reflect, reflectance, transmittance};
+use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{EntrySampling, Scene, View};
+use crate::scene::{EntrySampling, Object, Scene, View};
 use crate::tally::{Clock, Tally};
-use std::sync::Once;
+use std::sync::{Arc, Once};
 
 /// A cached sample, its columns twice while the tree is built, and its share of the tree.
 const BYTES_PER_SAMPLE: u128 = 256;
@@ -32,9 +34,11 @@ pub struct Subsurface {
     light: DirectLight,
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
-    plans: Vec<Option<Plan>>,
-    /// Light scattered once, where a model leaves it out.
+    plans: Vec<Option<Arc<Plan>>>,
+    /// Light scattered once, where a model leaves it out and no paths go on.
     single: Option<Single>,
+    /// Light over other surfaces; `None` where there is none, or it is not asked for.
+    indirect: Option<Indirect>,
     surveyed: Once,
 }
 
@@ -51,13 +55,17 @@ impl Subsurface {
         let needed = u128::from(samples) * BYTES_PER_SAMPLE;
         memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
         let lights = Lights::new(scene);
-        let plans = objects.map(|object| Plan::new(scene, &lights, object, options)).collect::<Result<_>>()?;
+        let plan = |object| Ok(Plan::new(scene, &lights, object, options)?.map(Arc::new));
+        let plans: Vec<Option<Arc<Plan>>> = objects.map(plan).collect::<Result<_>>()?;
+        let modelled = modelled(scene, &plans, &options);
+        let indirect = goes_on(scene, &modelled, &options).then(|| Indirect::new(scene, &plans, modelled, &options));
         Ok(Self {
             options,
             light: DirectLight { lights, samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
             plans,
-            single: if options.single { Single::new(scene, options.seed)? } else { None },
+            single: if options.single && indirect.is_none() { Single::new(scene, options.seed)? } else { None },
+            indirect,
             surveyed: Once::new(),
         })
     }
@@ -102,6 +110,42 @@ impl Subsurface {
         inside
     }
 
+    /// Paths from the camera; all that they ask of a body is gathered together.
+    fn all_the_light(
+        &self,
+        view: View<'_>,
+        (indirect, pass): (&Indirect, &[Option<Gatherer>]),
+        rays: &[CameraRay],
+        hits: &[Option<Hit>],
+        out: &mut [Rgb],
+        tally: &mut Tally,
+    ) {
+        let (mut paths, mut asked) = (PathScratch::default(), Vec::new());
+        for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
+            out[i] = match hit {
+                None => self.light.lights.environment(ray.ray.direction),
+                Some(hit) => indirect.paths.seen(view, ray, hit, &mut paths, tally),
+            };
+            asked.extend(paths.asked.drain(..).map(|asked| (i, asked)));
+        }
+        asked.sort_by_key(|(_, asked)| asked.object);
+        let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
+        for group in asked.chunk_by(|a, b| a.1.object == b.1.object) {
+            let object = group[0].1.object as usize;
+            let (Some(plan), Some(gatherer)) = (&self.plans[object], &pass[object]) else { continue };
+            let point = |(_, asked): &(usize, Asked)| {
+                let x = (asked.at.x - plan.body.table.centre()).as_vec3();
+                let exit = Exit { x, n: asked.at.normal_seen_from(asked.w), w: asked.w };
+                GatherPoint { exit, place: asked.at.x, stream: asked.stream }
+            };
+            let points: Vec<GatherPoint> = group.iter().map(point).collect();
+            plan.gather((view, &self.light.lights), gatherer, &points, &mut scratch, tally, &mut sums);
+            for ((i, asked), sum) in group.iter().zip(&sums) {
+                out[*i] += *sum * asked.weight;
+            }
+        }
+    }
+
     fn shade(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, inside: Rgb, tally: &mut Tally) -> Rgb {
         let at = view.point(hit, ray.ray.direction);
         let mut stream = ray.stream;
@@ -139,6 +183,48 @@ impl Subsurface {
     }
 }
 
+/// How paths meet each body.
+fn modelled(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
+    let of = |plan: &Option<Arc<Plan>>| {
+        let plan = plan.as_ref()?;
+        let first = options.single && !plan.body.model.claims().first_order;
+        let clear = lets_light_through(scene, plan.body.object, plan.medium());
+        let walked = if first { Some(1) } else { clear.then_some(0) };
+        let near = plan.near.as_ref().map(|_| plan.clone());
+        Some(Modelled { eta: plan.body.eta, walked, near })
+    };
+    plans.iter().map(of).collect()
+}
+
+/// Optical thickness of bodies beyond which no light is taken to come through straight: less than exp(-14), a millionth.
+const OPAQUE: f64 = 14.0;
+
+/// Whether light comes straight through a body, by its thickness.
+fn lets_light_through(scene: &Scene, object: u32, medium: &Medium) -> bool {
+    let sigma_t = medium.sigma_t();
+    let least = f64::from(sigma_t.0.into_iter().fold(f32::INFINITY, f32::min));
+    scene.objects[object as usize].thickness().is_some_and(|thickness| least * thickness < OPAQUE)
+}
+
+/// Whether any light comes over another surface: not where one convex body stands alone among lights.
+fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOptions) -> bool {
+    if options.bounces == 0 {
+        return false;
+    }
+    let reflects = |(i, o): &(usize, &Object)| {
+        modelled[*i].is_some() || !scene.materials[o.material].surface.bsdf.albedo().is_black()
+    };
+    let mut all = scene.objects.iter().enumerate().filter(reflects);
+    match (all.next(), all.next()) {
+        (None, _) => false,
+        (Some((i, object)), None) => {
+            let clear = modelled[i].as_ref().is_some_and(|m| m.walked == Some(0));
+            clear || !Solid::new(&object.mesh).is_convex(0.0)
+        }
+        _ => true,
+    }
+}
+
 impl Integrator for Subsurface {
     type Pass = Vec<Option<Gatherer>>;
 
@@ -150,11 +236,22 @@ impl Integrator for Subsurface {
                 each.for_each(|(plan, seen)| plan.iter().for_each(|plan| plan.survey(view, lights, &seen)));
             });
         });
-        self.plans.iter().map(|plan| Some(plan.as_ref()?.fill(view, lights, pass, tally))).collect()
+        let mut fill = |plan: &Option<Arc<Plan>>| Some(plan.as_ref()?.fill(view, lights, pass, tally));
+        let mut caches: Vec<Option<Cache>> = self.plans.iter().map(&mut fill).collect();
+        if let Some(indirect) = &self.indirect {
+            indirect.add(view, lights, &self.plans, &mut caches, pass, tally);
+        }
+        let ready =
+            |(plan, cache): (&Option<Arc<Plan>>, Option<Cache>)| Some(plan.as_ref()?.ready(cache?, pass, tally));
+        self.plans.iter().zip(caches).map(ready).collect()
     }
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = camera_hits(view, rays, tally);
+        if let Some(indirect) = &self.indirect {
+            self.all_the_light(view, (indirect, pass), rays, &hits, out, tally);
+            return;
+        }
         let inside = self.inside(view, pass, rays, &hits, tally);
         for (((ray, hit), inside), out) in rays.iter().zip(&hits).zip(inside).zip(out) {
             *out = match hit {

@@ -62,6 +62,7 @@ impl Method {
                     specular: options.specular.unwrap_or(start.specular),
                     single: options.single.unwrap_or(start.single),
                     light_samples,
+                    bounces: if as_notes { 0 } else { options.bounces.unwrap_or(start.bounces) },
                     seed,
                     ..start
                 };

@@ -8,7 +8,7 @@ use super::materials::{self, MaterialEntry};
 use super::objects::{self, ObjectEntry};
 use super::options::{MethodOptions, RenderOptions, named};
 use super::tree::{Fields, Node, Value};
-use super::values::{UNIT, named_value, switch, unit, unit_vector, vector, whole};
+use super::values::{UNIT, named_value, switch, unit, unit_vector, vector, whole, whole_or_none};
 use super::{Geometry, difference};
 use crate::error::{Error, Result};
 use crate::input;
@@ -217,6 +217,7 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         "spread",
         "specular",
         "single",
+        "bounces",
         "orders",
         "photons",
     ];
@@ -236,9 +237,8 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
         specular: switch(&m, "specular")?,
         single: switch(&m, "single")?,
         orders: named_value(&m, "orders")?,
-        photons: m.get("photons", "a whole number from 0 to 16777216", |n| {
-            n.integer().filter(|i| (0..=1 << 24).contains(i)).map(|i| i as u32)
-        })?,
+        bounces: whole_or_none(&m, "bounces")?,
+        photons: whole_or_none(&m, "photons")?,
     })
 }
 

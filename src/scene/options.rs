@@ -143,6 +143,8 @@ pub struct MethodOptions {
     pub spread: Option<Spread>,
     /// Subsurface: add light scattered once to models that leave it out.
     pub single: Option<bool>,
+    /// Subsurface and path: surfaces that light may go over, 0 to 2^24; as many as it takes if absent.
+    pub bounces: Option<u32>,
     /// Volume path: the scattering orders that are wanted.
     pub orders: Option<Orders>,
     /// Volume path: photons per pass and translucent object, 0 to 2^24.

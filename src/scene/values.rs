@@ -64,6 +64,12 @@ pub(super) fn whole(fields: &Fields<'_>, key: &str, largest: u32) -> Result<Opti
     fields.get(key, &expected, |n| n.integer().filter(|i| (1..=i64::from(largest)).contains(i)).map(|i| i as u32))
 }
 
+/// A whole number from 0 to 2^24.
+pub(super) fn whole_or_none(fields: &Fields<'_>, key: &str) -> Result<Option<u32>> {
+    let integer = |n: &Node| n.integer().filter(|i| (0..=1 << 24).contains(i)).map(|i| i as u32);
+    fields.get(key, "a whole number from 0 to 16777216", integer)
+}
+
 /// `true` or `false`.
 pub(super) fn switch(fields: &Fields<'_>, key: &str) -> Result<Option<bool>> {
     fields.get(key, "true or false", |n| if let Value::Bool(b) = n.value { Some(b) } else { None })

@@ -8,6 +8,8 @@ pub struct GatherTally {
     pub samples: u64,
     /// Of these, samples that carry light.
     pub lit: u64,
+    /// Samples of light that came over other surfaces.
+    pub indirect: u64,
     /// Exit points gathered at.
     pub exits: u64,
     /// Nodes of trees visited.
@@ -26,4 +28,16 @@ pub struct GatherTally {
     pub clamped: u64,
 }
 
-adds_up!(GatherTally { samples, lit, exits, nodes, pairs, evaluated, near_points, near, non_finite, clamped });
+adds_up!(GatherTally {
+    samples,
+    lit,
+    indirect,
+    exits,
+    nodes,
+    pairs,
+    evaluated,
+    near_points,
+    near,
+    non_finite,
+    clamped
+});

@@ -13,6 +13,7 @@ use crate::light::{Arrival, Lights, emitted};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
+use crate::sampling::PixelStream;
 use crate::scene::{Orders, Surface};
 use crate::surface::Bsdf;
 use crate::tally::{Cause, Tally, WalkTally};
@@ -25,6 +26,10 @@ pub struct CameraPath<'a> {
     pub scratch: &'a mut Scratch,
     pub tally: &'a mut Tally,
     pub draws: Draws,
+    /// Numbers of the sample's own, for what is asked of models.
+    pub stream: PixelStream,
+    /// Questions to models so far, but for the first surface's.
+    pub asked: u32,
     /// Numbers for connections, so that they do not disturb the walk's.
     pub coins: Draws,
     pub spectrum: Spectrum,
@@ -36,6 +41,8 @@ pub struct CameraPath<'a> {
     pub order: u32,
     /// Density [1/sr] of the present direction, where lights were asked for at the last, Lambertian surface.
     pub by_bsdf: Option<f32>,
+    /// Whether it comes from a step in a near field, which has the light of lights that it meets next.
+    pub stepped: bool,
     /// The body that was just left, and how.
     pub left: Option<(&'a Body, Option<Straight>)>,
     pub radiance: Rgb,
@@ -50,7 +57,7 @@ impl<'a> CameraPath<'a> {
     }
 
     /// Follows `ray` outside all bodies until nothing is left. Each surface that absorbs ends it by chance; it is given up
-    /// after [`MOST_SURFACES`] alone.
+    /// after as many surfaces as were asked for, or [`MOST_SURFACES`].
     pub fn trace(&mut self, mut ray: Ray) {
         for bounces in 0_u32.. {
             self.tally.rays.bounce += 1;
@@ -58,11 +65,11 @@ impl<'a> CameraPath<'a> {
                 self.meet_sky(ray.direction);
                 return;
             };
-            let Some(next) = self.meet(&hit, ray.direction) else { return };
-            if bounces >= MOST_SURFACES {
-                self.lose(hit.mesh, Cause::Endless);
+            if bounces >= self.method.bounces {
+                self.end(&hit, ray.direction);
                 return;
             }
+            let Some(next) = self.meet(&hit, ray.direction) else { return };
             ray = next;
         }
     }
@@ -73,19 +80,26 @@ impl<'a> CameraPath<'a> {
         match self.view.rays.closest(ray) {
             None => self.meet_sky(ray.direction),
             Some(hit) => {
-                let share = self.left.map_or(1.0, |(body, straight)| match straight {
-                    // Met by chance alone, and seldom: white specks.
-                    None if self.method.through(body).is_some_and(|t| t.alone(hit.mesh)) => 0.0,
-                    None => 1.0,
-                    Some(_) => self.share(&hit, ray.direction),
-                });
+                let share = self.share(&hit, ray.direction);
                 self.add_lamp(&hit, ray.direction, share);
             }
         }
     }
 
+    /// The last surface of a path: what shines there, no more.
+    fn end(&mut self, hit: &Hit, direction: Vec3) {
+        if self.view.scene.surface(hit.mesh).shines() {
+            self.meet(hit, direction);
+        } else if self.method.bounces == MOST_SURFACES {
+            self.lose(hit.mesh, Cause::Endless);
+        }
+    }
+
     /// Adds a share of a lamp that is met by chance.
     fn add_lamp(&mut self, hit: &Hit, direction: Vec3, share: f32) {
+        if self.stepped {
+            return;
+        }
         let light = self.spectrum.value_outside() * emitted(self.view.scene, hit, direction) * share;
         if let (false, Some(number)) = (light.is_black(), self.method.light.lights.number(hit.mesh)) {
             self.tally.rays.lights.meet(number);
@@ -95,6 +109,9 @@ impl<'a> CameraPath<'a> {
 
     /// Adds the environment.
     fn meet_sky(&mut self, w: Vec3) {
+        if self.stepped {
+            return;
+        }
         let lights = &self.method.light.lights;
         let share = match lights.pdf_sun(w) {
             by_table if by_table > 0.0 => {
@@ -117,13 +134,18 @@ impl<'a> CameraPath<'a> {
             (None, Some((body, Some(straight)))) => {
                 sun_share_by_chance((body, self.method.through(body)), straight, by_table)
             }
-            // Met by chance alone, and seldom: white specks, which single scattering beside models leaves out.
-            (None, Some((body, None))) if self.method.once => {
+            (None, Some((body, None))) if self.leaves_specks_out(body) => {
                 let alone = self.method.through(body).is_some_and(|t| t.sun_alone(by_table));
                 if alone { 0.0 } else { 1.0 }
             }
             _ => 1.0,
         }
+    }
+
+    /// Whether small lights are left out that are met by chance alone, and seldom, after light scattered once was reflected inside a
+    /// body: white specks, where the first order stands beside a model.
+    fn leaves_specks_out(&self, body: &Body) -> bool {
+        self.order > 0 && (self.method.once || self.method.modelled[body.object as usize].is_some())
     }
 
     /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision or the Lambertian
@@ -132,7 +154,11 @@ impl<'a> CameraPath<'a> {
         if let Some(by_bsdf) = self.by_bsdf {
             return by_bsdf / (by_bsdf + self.method.light.lights.pdf_angle(self.view.scene, hit, direction));
         }
-        let Some((body, Some(straight))) = &self.left else { return 1.0 };
+        let Some((body, straight)) = &self.left else { return 1.0 };
+        let Some(straight) = straight else {
+            let alone = || self.method.through(body).is_some_and(|t| t.alone(hit.mesh));
+            return if self.leaves_specks_out(body) && alone() { 0.0 } else { 1.0 };
+        };
         let lit = (*body, self.method.through(body));
         share_by_chance(self.view.scene, &self.method.light.lights, lit, straight, hit, direction)
     }
@@ -154,11 +180,17 @@ impl<'a> CameraPath<'a> {
                 None
             }
             Surface { inside: None, bsdf, .. } => {
-                self.left = None;
+                (self.left, self.stepped) = (None, false);
                 self.reflect(&at, -direction, &**bsdf)
             }
             Surface { bsdf, .. } => {
-                self.left = None;
+                (self.left, self.stepped) = (None, false);
+                if let Some(surface) = &self.method.stand_ins[hit.mesh as usize] {
+                    return self.reflect(&at, -direction, surface);
+                }
+                if self.method.modelled[hit.mesh as usize].is_some() {
+                    return self.meet_modelled(hit, &at, direction);
+                }
                 self.direct = self.other;
                 let body = self.method.bodies[hit.mesh as usize].as_ref()?;
                 if !self.faces(body, hit, direction) || self.other <= 0.0 {
@@ -262,7 +294,7 @@ impl Watch for Gather<'_, '_> {
     fn collision(&mut self, x: DVec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
         let (path, body) = (&mut *self.path, self.body);
         path.order += 1;
-        if path.method.options.orders.none_above(path.order) {
+        if path.method.options.orders.none_above(path.order) || path.in_model(body) {
             return false;
         }
         let photons = path.photons.get(body.object as usize).and_then(Option::as_ref);

@@ -4,6 +4,7 @@ use super::body::Body;
 use super::cells::Cells;
 use super::draws::Draws;
 use super::facets::Crossing;
+use super::modelled::Asked;
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::Ray;
@@ -18,6 +19,8 @@ pub struct Scratch {
     rows: Vec<(u32, u32)>,
     found: Vec<(DVec3, Rgb)>,
     pub crossings: Vec<Crossing>,
+    /// Where paths ask models for light.
+    pub asked: Vec<Asked>,
 }
 
 /// The share of light over a straight flight of `length` from a collision whose phase function into that direction is

@@ -1,4 +1,5 @@
-//! Paths through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach.
+//! Paths through a scene and through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach,
+//! and all that is between bodies for the methods that have those models.
 //! Read first: `camera.rs` (a path through the scene), `body.rs` (inside one object), then `connect.rs` (what makes it fast).
 
 mod body;
@@ -11,6 +12,7 @@ mod connect;
 mod draws;
 mod emission;
 mod facets;
+mod modelled;
 mod pencil;
 mod photons;
 mod spectrum;
@@ -25,14 +27,16 @@ use crate::math::Rgb;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
+use crate::surface::Lambertian;
 use crate::tally::{Cause, Tally};
 use crate::words::short;
 use body::Body;
 pub use body::MOST_SURFACES;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
-use connect::Scratch;
-use draws::Draws;
+pub(super) use connect::Scratch;
+pub(super) use draws::Draws;
+pub(super) use modelled::{Asked, Modelled};
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
@@ -73,6 +77,12 @@ pub struct VolumePath {
     camera_in: Option<u32>,
     /// Whether this is [`Self::once`].
     once: bool,
+    /// One for each object; for bodies whose light a model has.
+    modelled: Vec<Option<Modelled>>,
+    /// One for each object; what stands for the surface of a body that paths do not enter.
+    stand_ins: Vec<Option<Lambertian>>,
+    /// Surfaces over which a path goes on, at most.
+    bounces: u32,
 }
 
 /// Cubes along the longest side of the tables of distances.
@@ -106,9 +116,33 @@ impl VolumePath {
         // Of an environment, what is beside suns is met by paths that go on.
         let beside = if lights.has_environment() { lights.share_beside_suns() } else { 0.0 };
         let persistence = beside.sqrt().max(least);
-        let throughs = throughs(scene, &lights, &bodies);
-        let light = DirectLight { lights, samples: 1 };
-        Ok(Self { options, light, bodies, throughs, sources, persistence, camera_in: scene.camera_in(), once: false })
+        Ok(Self {
+            throughs: throughs(scene, &lights, &bodies),
+            light: DirectLight { lights, samples: 1 },
+            bodies,
+            sources,
+            persistence,
+            camera_in: scene.camera_in(),
+            ..Self::surfaces(scene, options)
+        })
+    }
+
+    /// Paths over opaque surfaces, which end where they come to a body.
+    pub(super) fn surfaces(scene: &Scene, options: VolumePathOptions) -> Self {
+        let each = 0..scene.objects.len();
+        Self {
+            options,
+            light: DirectLight { lights: Lights::new(scene), samples: 1 },
+            bodies: each.clone().map(|_| None).collect(),
+            throughs: each.clone().map(|_| None).collect(),
+            sources: each.clone().map(|_| None).collect(),
+            persistence: 1.0,
+            camera_in: None,
+            once: false,
+            modelled: vec![None; each.len()],
+            stand_ins: vec![None; each.len()],
+            bounces: MOST_SURFACES,
+        }
     }
 
     /// What to say of `scene` before it is rendered: light that may not be found.
@@ -128,6 +162,7 @@ impl VolumePath {
         let direction = ray.ray.direction;
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
         match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
+            _ if self.modelled[hit.mesh as usize].is_some() => path.seen(hit, direction),
             (Some(body), _) => both_parts(&mut path, body, hit, direction),
             (None, Surface { emission: Some(_), .. }) => {
                 path.radiance = self.of_order_0(emitted(view.scene, hit, direction))
@@ -163,22 +198,38 @@ impl VolumePath {
         scratch: &'a mut Scratch,
         tally: &'a mut Tally,
     ) -> CameraPath<'a> {
+        let own = stream;
         let ([a, b], [c, d]) = (stream.next_2d(), stream.next_2d());
         let ([e, f], [g, h]) = (stream.next_2d(), stream.next_2d());
-        let mut draws = Draws::new(&[a, b, c, d], stream.key());
+        let draws = Draws::new(&[a, b, c, d], stream.key());
+        let coins = draws.fork_with(&[e, f, g, h], 0);
+        self.path_by((draws, coins, own), (view, photons), scratch, tally)
+    }
+
+    /// The same by given numbers: of the path, of its connections, of what it asks models for.
+    fn path_by<'a>(
+        &'a self,
+        (mut draws, coins, stream): (Draws, Draws, PixelStream),
+        (view, photons): (View<'a>, &'a [Option<Cells>]),
+        scratch: &'a mut Scratch,
+        tally: &'a mut Tally,
+    ) -> CameraPath<'a> {
         CameraPath {
             method: self,
             view,
             photons,
             scratch,
             tally,
-            coins: draws.fork_with(&[e, f, g, h], 0),
+            coins,
             spectrum: Spectrum::new(Rgb::WHITE, draws.number()),
             draws,
+            stream,
+            asked: 0,
             direct: 1.0,
             other: 1.0,
             order: 0,
             by_bsdf: None,
+            stepped: false,
             left: None,
             radiance: Rgb::BLACK,
         }
@@ -188,14 +239,9 @@ impl VolumePath {
     /// meshes and objects in one another are no fault here.
     pub(super) fn once(scene: &Scene, wanted: impl Fn(usize) -> bool, seed: u64) -> Self {
         let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
-        let endless = |body: Body| Body { endless: true, ..body };
-        let lights = Lights::new(scene);
-        let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
-        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
-        let sources = bodies.iter().map(|_| None).collect();
-        let throughs = throughs(scene, &lights, &bodies);
-        let light = DirectLight { lights, samples: 1 };
-        Self { options, light, bodies, throughs, sources, persistence: 1.0, camera_in: None, once: true }
+        let surfaces = Self::surfaces(scene, options);
+        let bodies = endless_bodies(scene, wanted);
+        Self { throughs: throughs(scene, &surfaces.light.lights, &bodies), bodies, once: true, ..surfaces }
     }
 
     /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
@@ -241,6 +287,13 @@ fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
         _ => None,
     });
     Some(Body { leak: leak.unwrap_or(Cause::Rounding), ..body })
+}
+
+/// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault.
+fn endless_bodies(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Body>> {
+    let endless = |body: Body| Body { endless: true, ..body };
+    let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
+    (0..scene.objects.len()).map(body).collect()
 }
 
 /// How lamps and suns are asked for in each of the bodies that scatter.
