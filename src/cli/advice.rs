@@ -105,8 +105,11 @@ impl<'a> Advice<'a> {
         match self.prepared.method {
             Method::Subsurface(_) => None,
             Method::VolumePath(_) => Some(format!("{who}: light is traced through, no model: what is wrong is noise")),
-            Method::Direct(_) => {
-                Some(format!("{who}: `direct` paints it matt (Lambertian), no light goes through: --method subsurface"))
+            Method::Direct(_) | Method::Path(_) => {
+                let method = self.prepared.method.name();
+                Some(format!(
+                    "{who}: `{method}` paints it matt (Lambertian), no light goes through: --method subsurface"
+                ))
             }
             Method::AmbientOcclusion(_) => {
                 Some(format!("{who}: `ambient_occlusion` shows shapes alone, no material: --method subsurface"))

@@ -11,7 +11,7 @@ use std::path::Path;
 /// Options that decide what is computed.
 #[derive(Clone, clap::Args)]
 pub struct MethodArgs {
-    /// ambient_occlusion, direct, subsurface or volume_path [default: the scene's, else subsurface if anything is translucent]
+    /// ambient_occlusion, direct, path, subsurface or volume_path [default: the scene's, else subsurface if anything is translucent]
     #[arg(long, value_name = "NAME")]
     method: Option<MethodName>,
     /// BSSRDF model of all translucent materials [default: each material's own]

@@ -6,7 +6,7 @@
 //! as for a pixel, and from places where light arrives. What it brings to a body is a sample as any other, gathered by the next round.
 
 use super::volume_path::{Draws, Modelled, VolumePath, VolumePathOptions};
-use super::{MOST_SURFACES, View};
+use super::{MOST_SURFACES, Part, View};
 use crate::bssrdf::Exit;
 use crate::cache::{Cache, CachedSample, GatherPoint, Plan, Scratch, SubsurfaceOptions};
 use crate::geometry::SurfacePoint;
@@ -33,6 +33,9 @@ const PURPOSE: u64 = 0x696e_6469_7265_6374;
 /// Samples of each object's cache: place, and all of the flux they stand for.
 type Rows = Vec<Vec<CachedSample>>;
 
+/// What a method's list of parts calls [`Indirect`].
+pub const OVER: &str = "light over other surfaces";
+
 /// Light over other surfaces.
 pub struct Indirect {
     /// Paths from the camera.
@@ -40,7 +43,10 @@ pub struct Indirect {
     /// Paths backwards from places of entry; `None` where no opaque surface reflects.
     surfaces: Option<VolumePath>,
     bounces: u32,
+    /// Paths of each kind in a pass, for each body at most.
     count: u32,
+    /// Whether paths are scattered once in some body.
+    once: bool,
     seed: u64,
     /// For each object, of even passes and of odd ones.
     streams: Vec<[CacheStream; Turn::STREAMS]>,
@@ -80,6 +86,7 @@ impl Indirect {
         let own = hash_combine(seed, PURPOSE);
         let streams = |object| Turn::seeds(own).map(|seed| CacheStream::new(Points::Sobol, seed, object));
         Self {
+            once: modelled.iter().flatten().any(|m| m.walked == Some(1)),
             paths: VolumePath::over_models(
                 scene,
                 modelled,
@@ -93,6 +100,24 @@ impl Indirect {
             seed: own,
             streams: (0..scene.objects.len() as u64).map(streams).collect(),
         }
+    }
+
+    /// What is said of it.
+    pub fn part(&self) -> Part {
+        let count = self.count;
+        let over = if self.surfaces.is_some() { "; as many backwards over opaque surfaces" } else { "" };
+        Part::built(OVER, format!("a pass, {count} paths of light from each body and {count} that it mirrors{over}"))
+    }
+
+    /// Whether paths are scattered once in bodies whose models lack that.
+    pub fn walks_once(&self) -> bool {
+        self.once
+    }
+
+    /// Memory beside that of `samples` cached samples of `bodies` bodies, at its most [bytes].
+    pub fn bytes(&self, bodies: u64, samples: u64) -> u64 {
+        let paths = bodies * u64::from(self.count) * if self.surfaces.is_some() { 3 } else { 2 };
+        (samples + 4 * paths) * size_of::<CachedSample>() as u64
     }
 
     /// Adds to the caches of pass number `pass`, which have the light that comes straight from the lights, all other light.

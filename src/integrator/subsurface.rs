@@ -1,7 +1,7 @@
 //! Translucent surfaces: light gathered from a cache of transmitted-light samples, leaving through the boundary.
 
 use super::direct::lambertian_albedos;
-use super::indirect::Indirect;
+use super::indirect::{Indirect, OVER};
 use super::parts::of_cache;
 use super::shade::DirectLight;
 use super::single::Single;
@@ -28,7 +28,7 @@ const BYTES_PER_SAMPLE: u128 = 256;
 const TAKEN_PER_SAMPLE: u64 = 180;
 
 /// L_o = T21 Σ S_d L_t / M + specular reflection, over a cache refilled each pass. Light passes between points of one
-/// object only; what enters is direct light.
+/// object only; what enters is all light that arrives, or with no [`SubsurfaceOptions::bounces`] what comes straight from lights.
 pub struct Subsurface {
     options: SubsurfaceOptions,
     light: DirectLight,
@@ -68,6 +68,11 @@ impl Subsurface {
             indirect,
             surveyed: Once::new(),
         })
+    }
+
+    /// What to say of `scene` before it is rendered: light that may not be found.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        self.indirect.as_ref().map_or(Vec::new(), |indirect| indirect.paths.warnings(scene))
     }
 
     /// Number of bodies with a near field.
@@ -266,8 +271,11 @@ impl Integrator for Subsurface {
     }
 
     fn pass_bytes(&self, _view: View<'_>) -> u64 {
-        let samples: u64 = self.plans.iter().flatten().map(|plan| u64::from(plan.samples)).sum();
-        samples * TAKEN_PER_SAMPLE
+        let plans = self.plans.iter().flatten();
+        let samples: u64 = plans.clone().map(|plan| u64::from(plan.samples)).sum();
+        // While light over other surfaces is found, the cache is there twice.
+        let twice = self.indirect.as_ref().map_or(0, |indirect| indirect.bytes(plans.count() as u64, samples));
+        samples * TAKEN_PER_SAMPLE + twice
     }
 
     fn lights(&self, scene: &Scene) -> KnownLights {
@@ -288,13 +296,21 @@ impl Integrator for Subsurface {
         for (object, plan) in scene.objects.iter().zip(&self.plans) {
             parts.extend(plan.iter().flat_map(|plan| of_cache(plan, &object.name, self.options.estimator)));
         }
-        parts.push(match (&self.single, self.options.single) {
-            (Some(_), _) => Part::built(
+        parts.push(match &self.indirect {
+            Some(indirect) => indirect.part(),
+            None if self.options.bounces == 0 => {
+                Part::left_out(OVER, "switched off: light comes straight from the lights")
+            }
+            None => Part::left_out(OVER, "no surface reflects light to another, and no body to itself"),
+        });
+        let lacking = self.single.is_some() || self.indirect.as_ref().is_some_and(Indirect::walks_once);
+        parts.push(match (lacking, self.options.single) {
+            (true, _) => Part::built(
                 "single scattering",
                 "straight from lamps, but for what small lamps send by a reflection inside; the models begin with light scattered twice",
             ),
-            (None, true) => Part::left_out("single scattering", "the models have it"),
-            (None, false) => Part::left_out("single scattering", "switched off"),
+            (false, true) => Part::left_out("single scattering", "the models have it"),
+            (false, false) => Part::left_out("single scattering", "switched off"),
         });
         parts.push(if self.options.specular {
             Part::built("specular reflection", "nearest-hit rays")

@@ -171,10 +171,12 @@ impl Prepared {
         }
         let seed = options.seed.or(file.render.seed).unwrap_or(0);
         let method = Method::new(&scene, &file.method, as_notes, seed)?;
-        if let Method::VolumePath(paths) = &method {
-            let warnings = paths.warnings(&scene);
-            scene.warnings.extend(warnings);
-        }
+        let warnings = match &method {
+            Method::VolumePath(paths) => paths.warnings(&scene),
+            Method::Subsurface(subsurface) => subsurface.warnings(&scene),
+            _ => Vec::new(),
+        };
+        scene.warnings.extend(warnings);
         let backend = options.backend.unwrap_or(Backend::preferred());
         let estimator = method::estimator(&file.method, as_notes);
         Ok(Self { file, scene, method, backend, seed, as_notes, repair, estimator })

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::integrator::{
-    AmbientOcclusion, CameraRay, Direct, Integrator, KnownLights, Part, Subsurface, SubsurfaceOptions, View,
+    AmbientOcclusion, CameraRay, Direct, Integrator, KnownLights, Part, Path, Subsurface, SubsurfaceOptions, View,
     VolumePath, VolumePathOptions,
 };
 use crate::math::Rgb;
@@ -16,6 +16,7 @@ use std::any::Any;
 pub enum Method {
     AmbientOcclusion(AmbientOcclusion),
     Direct(Box<Direct>),
+    Path(Box<Path>),
     Subsurface(Box<Subsurface>),
     VolumePath(Box<VolumePath>),
 }
@@ -41,7 +42,7 @@ impl Method {
     /// entry and spread.
     ///
     /// # Errors
-    /// Those of [`Direct::new`], [`Subsurface::new`] and [`VolumePath::new`].
+    /// Those of [`Direct::new`], [`Path::new`], [`Subsurface::new`] and [`VolumePath::new`].
     pub fn new(scene: &Scene, options: &MethodOptions, as_notes: bool, seed: u64) -> Result<Self> {
         let light_samples = options.light_samples.unwrap_or(1);
         Ok(match options.name.unwrap_or_else(|| scene.default_method()) {
@@ -50,6 +51,7 @@ impl Method {
                 rays: options.rays.unwrap_or(4),
             }),
             MethodName::Direct => Self::Direct(Direct::new(scene, light_samples)?.into()),
+            MethodName::Path => Self::Path(Path::new(scene, options.bounces, seed)?.into()),
             MethodName::Subsurface => {
                 let start = subsurface(as_notes);
                 let estimator = estimator(options, as_notes);
@@ -86,6 +88,7 @@ impl Method {
         match self {
             Self::AmbientOcclusion(_) => MethodName::AmbientOcclusion.name(),
             Self::Direct(_) => MethodName::Direct.name(),
+            Self::Path(_) => MethodName::Path.name(),
             Self::Subsurface(_) => MethodName::Subsurface.name(),
             Self::VolumePath(_) => MethodName::VolumePath.name(),
         }
@@ -94,7 +97,7 @@ impl Method {
     /// Tables over the triangles of translucent objects [bytes/triangle].
     pub fn bytes_per_triangle(&self) -> u64 {
         match self {
-            Self::AmbientOcclusion(_) | Self::Direct(_) => 0,
+            Self::AmbientOcclusion(_) | Self::Direct(_) | Self::Path(_) => 0,
             Self::Subsurface(_) => 40,
             Self::VolumePath(_) => 90,
         }
@@ -107,6 +110,7 @@ macro_rules! each {
         match $self {
             Method::AmbientOcclusion($method) => $value,
             Method::Direct($method) => $value,
+            Method::Path($method) => $value,
             Method::Subsurface($method) => $value,
             Method::VolumePath($method) => $value,
         }

@@ -97,14 +97,14 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The method where the file asks for none: subsurface with a translucent object, else direct light where there
-    /// is light, else ambient occlusion.
+    /// The method where the file asks for none: subsurface with a translucent object, else paths where there is light, else ambient
+    /// occlusion.
     pub fn default_method(&self) -> MethodName {
         let any = |test: fn(&Surface) -> bool| self.objects.iter().any(|o| test(&self.materials[o.material].surface));
         if any(Surface::is_translucent) {
             MethodName::Subsurface
         } else if !self.environment.is_black() || any(|s| s.emission.is_some()) {
-            MethodName::Direct
+            MethodName::Path
         } else {
             MethodName::AmbientOcclusion
         }

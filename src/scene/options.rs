@@ -47,6 +47,8 @@ named! {
     AmbientOcclusion = "ambient_occlusion",
     /// Light of area lights on diffuse surfaces.
     Direct = "direct",
+    /// Light over opaque surfaces, by any number of reflections.
+    Path = "path",
     /// Light through translucent materials.
     Subsurface = "subsurface",
     /// Paths traced through the media themselves.

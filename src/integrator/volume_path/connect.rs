@@ -1,10 +1,10 @@
 //! Joining a path from the camera to photons near it.
 
+use super::Asked;
 use super::body::Body;
 use super::cells::Cells;
 use super::draws::Draws;
 use super::facets::Crossing;
-use super::modelled::Asked;
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::Ray;

@@ -21,9 +21,9 @@ mod through;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, KnownLights, Part, View};
 use crate::error::{Error, Result};
-use crate::geometry::Clearance;
+use crate::geometry::{Clearance, SurfacePoint};
 use crate::light::{Lights, emitted};
-use crate::math::Rgb;
+use crate::math::{Rgb, Vec3};
 use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
@@ -36,7 +36,7 @@ use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 pub(super) use connect::Scratch;
 pub(super) use draws::Draws;
-pub(super) use modelled::{Asked, Modelled};
+pub(super) use modelled::Modelled;
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
@@ -89,6 +89,21 @@ pub struct VolumePath {
 const CLEARANCE_CELLS: u32 = 96;
 /// Connections reach this many mean free paths (by the mean extinction of the channels).
 const REACH: f32 = 3.0;
+
+/// Light that a path asks a model for.
+#[derive(Clone, Copy, Debug)]
+pub struct Asked {
+    /// Index of the body.
+    pub object: u32,
+    /// Where it leaves, its normals towards `w`.
+    pub at: SurfacePoint,
+    /// Unit direction in which it leaves.
+    pub w: Vec3,
+    /// What the path makes of a radiance there, under the boundary.
+    pub weight: Rgb,
+    /// Numbers of its own.
+    pub stream: PixelStream,
+}
 
 impl VolumePath {
     /// Tables for the translucent objects of `scene`, and for no others.

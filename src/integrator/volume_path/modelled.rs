@@ -5,7 +5,7 @@ use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
 use super::draws::Draws;
 use super::spectrum::Spectrum;
-use super::{VolumePath, VolumePathOptions, endless_bodies, throughs};
+use super::{Asked, VolumePath, VolumePathOptions, endless_bodies, throughs};
 use crate::bssrdf::Exit;
 use crate::cache::{Plan, Step};
 use crate::geometry::SurfacePoint;
@@ -29,21 +29,6 @@ pub struct Modelled {
     pub walked: Option<u32>,
     /// Where light that comes over other surfaces and enters close to an exit is no part of the cache: paths step there.
     pub near: Option<Arc<Plan>>,
-}
-
-/// Light that a path asks a model for.
-#[derive(Clone, Copy, Debug)]
-pub struct Asked {
-    /// Index of the body.
-    pub object: u32,
-    /// Where it leaves, its normals towards `w`.
-    pub at: SurfacePoint,
-    /// Unit direction in which it leaves.
-    pub w: Vec3,
-    /// What the path makes of a radiance there, under the boundary.
-    pub weight: Rgb,
-    /// Numbers of its own.
-    pub stream: PixelStream,
 }
 
 /// Ends a walk at its next collision but for so many.

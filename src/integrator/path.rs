@@ -1,0 +1,74 @@
+//! Path tracing over opaque surfaces: light from lamps and environment by any number of reflections.
+
+use super::direct::lambertian_albedos;
+use super::shade::DirectLight;
+use super::volume_path::{Scratch, VolumePath};
+use super::{CameraRay, Integrator, KnownLights, MOST_SURFACES, Part, View, camera_hits};
+use crate::error::Result;
+use crate::light::Lights;
+use crate::math::Rgb;
+use crate::scene::Scene;
+use crate::surface::Lambertian;
+use crate::tally::Tally;
+use crate::words::counted;
+
+/// Next-event estimation at each surface, multiple importance sampling with the direction in which the path goes on, Russian roulette.
+/// A translucent surface is shown as a Lambertian one with its model's diffuse reflectance: a preview.
+pub struct Path {
+    paths: VolumePath,
+    light: DirectLight,
+    bounces: Option<u32>,
+}
+
+impl Path {
+    /// Over at most `bounces` surfaces after the first; as many as it takes if absent.
+    ///
+    /// # Errors
+    /// A translucent material whose model does not exist for its medium.
+    pub fn new(scene: &Scene, bounces: Option<u32>, seed: u64) -> Result<Self> {
+        let stand_in =
+            |(object, albedo): (u32, Rgb)| scene.surface(object).is_translucent().then_some(Lambertian { albedo });
+        let stand_ins = (0..).zip(lambertian_albedos(scene)?).map(stand_in).collect();
+        let most = bounces.unwrap_or(MOST_SURFACES).min(MOST_SURFACES);
+        let light = DirectLight { lights: Lights::new(scene), samples: 1 };
+        Ok(Self { paths: VolumePath::over_surfaces(scene, stand_ins, most, seed), light, bounces })
+    }
+}
+
+impl Integrator for Path {
+    type Pass = ();
+
+    fn begin_pass(&self, _: View<'_>, _: u32, _: &mut Tally) {}
+
+    fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
+        let hits = camera_hits(view, rays, tally);
+        let mut scratch = Scratch::default();
+        for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
+            *out = match hit {
+                None => self.light.lights.environment(ray.ray.direction),
+                Some(hit) => self.paths.seen(view, ray, hit, &mut scratch, tally),
+            };
+        }
+    }
+
+    fn lights(&self, scene: &Scene) -> KnownLights {
+        KnownLights::asked(scene, &self.light.lights)
+    }
+
+    fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let mut parts = self.light.parts(scene);
+        let over = match self.bounces {
+            Some(most) => format!("over at most {} after the first", counted(most, "surface", "surfaces")),
+            None => "over as many surfaces as it takes, by Russian roulette".into(),
+        };
+        parts.push(Part::built("paths", over));
+        let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
+        let why = if translucent {
+            "`path` shows translucent surfaces as Lambertian ones of the same reflectance"
+        } else {
+            "no translucent material"
+        };
+        parts.push(Part::left_out("area tables and sample cache", why));
+        parts
+    }
+}
