@@ -11,6 +11,8 @@ mod connect;
 mod draws;
 mod emission;
 mod facets;
+#[cfg(test)]
+mod near_checks;
 mod pencil;
 mod photons;
 mod spectrum;
