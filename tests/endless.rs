@@ -2,67 +2,40 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
-use marmor::film::{Film, Image, Window};
-use marmor::integrator::{MOST_SURFACES, View, VolumePath, VolumePathOptions};
+mod parts;
+mod rendering;
+
+use marmor::film::Image;
+use marmor::integrator::{MOST_SURFACES, VolumePath, VolumePathOptions};
 use marmor::math::hash;
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
-use marmor::scene::{Orders, Scene, SceneFile};
+use marmor::query::Backend;
+use marmor::scene::{Orders, Scene};
 use marmor::tally::{Cause, Tally};
+use parts::centred;
+use rendering::{average, load, load_beside, on};
 use std::f64::consts::TAU;
-use std::fmt::Write;
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 const OPTIONS: VolumePathOptions = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed: 1 };
 
 fn render(scene: &Scene, passes: u32) -> (Image, Tally) {
-    let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
-    let resolution = scene.camera.resolution;
     let method = VolumePath::new(scene, OPTIONS).unwrap();
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed: 1, passes: Some(passes), time: None, cancel: &cancel };
-    let outcome = render::run(&method, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    let (film, outcome) = on(Backend::preferred(), scene, &method, 1, 0..passes);
     assert_eq!(film.counts().non_finite, 0);
     (film.image(), outcome.tally)
 }
 
-fn load(text: &str, folder: &Path) -> Scene {
-    Scene::load(&SceneFile::parse(text, &folder.join("scene.toml")).unwrap()).unwrap()
-}
-
-/// Corners of a cuboid of half sizes `half`, four above and four below.
-fn corners([a, b, c]: [f64; 3]) -> String {
-    let mut text = String::new();
-    for y in [b, -b] {
-        for [x, z] in [[-a, -c], [-a, c], [a, c], [a, -c]] {
-            writeln!(text, "v {x} {y} {z}").unwrap();
-        }
-    }
-    text
-}
-
-/// Its faces.
-const FACES: [&str; 6] = ["f 1 2 3 4", "f 8 7 6 5", "f 1 5 6 2", "f 2 6 7 3", "f 3 7 8 4", "f 4 8 5 1"];
-
-/// The cuboid as a body of this medium, in a white furnace; the camera as in the text.
-fn body(folder: &Path, half: [f64; 3], medium: &str, camera: &str) -> Scene {
-    std::fs::write(folder.join("box.obj"), corners(half) + &FACES.join("\n")).unwrap();
+/// A cuboid as a body of this medium, in a white furnace; the camera as in the text.
+fn body(half: [f64; 3], medium: &str, camera: &str) -> Scene {
     let text = format!(
         "unit = \"mm\"\n[camera]\n{camera}\nresolution = [8, 8]\n[[object]]\nname = \"body\"\nmesh = \"box.obj\"\n\
          material = \"m\"\n[material.m]\ntype = \"translucent\"\n{medium}\n[environment]\nradiance = 1\n"
     );
-    load(&text, folder)
-}
-
-fn mean(image: &Image) -> f64 {
-    image.pixels.iter().map(|p| f64::from(p.mean())).sum::<f64>() / image.pixels.len() as f64
+    load_beside("box.obj", &centred(half), &text)
 }
 
 /// Each pixel within `most` of `expected`.
 fn even(image: &Image, expected: f32, most: f32, what: &str) {
-    println!("{what}: {}, expected {expected}", mean(image));
+    println!("{what}: {}, expected {expected}", average(image));
     for pixel in &image.pixels {
         assert!((pixel.mean() - expected).abs() < most, "{what}: {pixel:?}, expected {expected}");
     }
@@ -74,7 +47,6 @@ fn even(image: &Image, expected: f32, most: f32, what: &str) {
 /// lengths are known: 1/cosine' of the refracted direction along the rod, the angle at both ends the same, Fresnel's R there.
 #[test]
 fn a_rod_leads_light_to_its_other_end() {
-    let folder = tempfile::tempdir().unwrap();
     let (length, eta, degrees) = (20.0, 1.5_f64, 40.0_f64);
     for half in [0.05, 0.01] {
         // The end at +z from so far away that the angle is the same all over it, and the end fills the view.
@@ -84,7 +56,7 @@ fn a_rod_leads_light_to_its_other_end() {
         let camera = format!("position = [{x}, 0, {z}]\nlook_at = [0, 0, {}]\nfov = {fov:e}", 0.5 * length);
         for sigma_a in [0.0, 1e-2] {
             let medium = format!("sigma_s = 0\nsigma_a = {sigma_a}\ng = 0\neta = {eta}");
-            let scene = body(folder.path(), [half, half, 0.5 * length], &medium, &camera);
+            let scene = body([half, half, 0.5 * length], &medium, &camera);
             let passes = if sigma_a == 0.0 { 4 } else { 64 };
             let (image, tally) = render(&scene, passes);
             let inside = (1.0 - (angle.sin() / eta).powi(2)).sqrt();
@@ -99,7 +71,7 @@ fn a_rod_leads_light_to_its_other_end() {
                 continue;
             }
             // Beside the mirror image each sample is 1 - R or nothing.
-            let (mean, samples) = (mean(&image), 64.0 * f64::from(passes));
+            let (mean, samples) = (average(&image), 64.0 * f64::from(passes));
             let share = (expected - r) / (1.0 - r);
             let error = (1.0 - r) * (share * (1.0 - share) / samples).sqrt();
             println!("{what}: {mean} +- {error}, expected {expected}");
@@ -111,11 +83,10 @@ fn a_rod_leads_light_to_its_other_end() {
 /// A sheet of a thousandth of a mean free path: what is scattered in it is caught between its faces for hundreds of them.
 #[test]
 fn a_thin_sheet_in_a_white_furnace_loses_nothing() {
-    let folder = tempfile::tempdir().unwrap();
     let camera = "position = [0, 9, 0.01]\nlook_at = [0, 0, 0]\nfov = 10";
     for sigma_s in [4.0, 1.0] {
         let medium = format!("sigma_s = {sigma_s}\nsigma_a = 0\ng = 0\neta = 1.5");
-        let (image, tally) = render(&body(folder.path(), [20.0, 0.0005, 20.0], &medium, camera), 1024);
+        let (image, tally) = render(&body([20.0, 0.0005, 20.0], &medium, camera), 1024);
         assert!(tally.walk.collisions > 100, "{:?}", tally.walk);
         assert_eq!(tally.walk.losses.total(), 0, "{:?}", tally.walk);
         even(&image, 1.0, 1e-5, &format!("sigma_s {sigma_s}"));
@@ -124,27 +95,30 @@ fn a_thin_sheet_in_a_white_furnace_loses_nothing() {
 
 /// A room with walls of this albedo and a window of half size `window` in its ceiling, in even light; the camera looks at the
 /// floor. The ball outside is there because the method wants a body.
-fn room(folder: &Path, albedo: f64, window: f64) -> Scene {
-    let mut text = corners([1.0; 3]);
-    for [x, z] in [[-1, -1], [-1, 1], [1, 1], [1, -1]] {
-        writeln!(text, "v {} 1 {}", f64::from(x) * window, f64::from(z) * window).unwrap();
+fn room(albedo: f64, window: f64) -> Scene {
+    let mut obj = centred([1.0; 3]);
+    if window > 0.0 {
+        let ceiling = "f 3 7 8 4\n";
+        assert!(obj.contains(ceiling));
+        obj = obj.replace(ceiling, "");
+        for [x, z] in [[-1.0, -1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, -1.0]] {
+            obj += &format!("v {} 1 {}\n", x * window, z * window);
+        }
+        obj += "f 3 7 10 9\nf 7 8 11 10\nf 8 4 12 11\nf 4 3 9 12\n";
     }
-    let ceiling = if window > 0.0 { "f 1 2 10 9\nf 2 3 11 10\nf 3 4 12 11\nf 4 1 9 12" } else { FACES[0] };
-    std::fs::write(folder.join("room.obj"), text + &FACES[1..].join("\n") + "\n" + ceiling).unwrap();
     let text = format!(
         "unit = \"mm\"\n[camera]\nposition = [0, 0.9, 0]\nlook_at = [0.01, -1, 0]\nfov = 0.5\nresolution = [8, 8]\n\
          [[object]]\nname = \"room\"\nmesh = \"room.obj\"\nmaterial = \"wall\"\n[material.wall]\ntype = \"diffuse\"\nalbedo = {albedo}\n\
          [[object]]\nname = \"ball\"\nshape = \"sphere\"\ncentre = [0, -3, 0]\nradius = 0.5\nmaterial = \"m\"\n\
          [material.m]\ntype = \"translucent\"\nsigma_s = 1\nsigma_a = 0\ng = 0\neta = 1\n[environment]\nradiance = 1\n"
     );
-    load(&text, folder)
+    load_beside("room.obj", &obj, &text)
 }
 
 #[test]
 fn a_white_room_with_a_small_window_is_a_white_furnace() {
-    let folder = tempfile::tempdir().unwrap();
     for window in [0.1, 0.05] {
-        let (image, tally) = render(&room(folder.path(), 1.0, window), 4);
+        let (image, tally) = render(&room(1.0, window), 4);
         assert_eq!(tally.walk.losses.total(), 0, "{:?}", tally.walk);
         even(&image, 1.0, 1e-6, &format!("window {window}"));
     }
@@ -186,11 +160,10 @@ fn by_walk(albedo: f64, window: f64, paths: u64) -> f64 {
 /// surface. By roulette after 16 walls in a row it was 0.035.
 #[test]
 fn a_bright_room_is_as_bright_as_a_walk_in_it_says() {
-    let folder = tempfile::tempdir().unwrap();
-    let text = room(folder.path(), 0.98, 0.1);
+    let text = room(0.98, 0.1);
     let (passes, paths) = (2048, 400_000);
     let (image, _) = render(&text, passes);
-    let mean = mean(&image);
+    let mean = average(&image);
     let expected = by_walk(0.98, 0.1, paths);
     // Each path brings 1 or nothing.
     let error = (expected * (1.0 - expected) * (1.0 / (64.0 * f64::from(passes)) + 1.0 / paths as f64)).sqrt();
@@ -203,8 +176,7 @@ fn a_bright_room_is_as_bright_as_a_walk_in_it_says() {
 /// What no light can leave ends, and is counted at the walls.
 #[test]
 fn a_closed_white_room_ends_and_is_counted() {
-    let folder = tempfile::tempdir().unwrap();
-    let scene = room(folder.path(), 1.0, 0.0);
+    let scene = room(1.0, 0.0);
     let (image, tally) = render(&scene, 1);
     assert!(image.pixels.iter().all(|p| p.is_black()));
     let found: Vec<_> = tally.walk.losses.each().collect();
@@ -218,9 +190,8 @@ fn a_closed_white_room_ends_and_is_counted() {
 /// comes in does; a camera inside can look that way.
 #[test]
 fn total_reflection_for_ever_ends_and_is_counted() {
-    let folder = tempfile::tempdir().unwrap();
     let camera = "position = [0.1, 0.2, 0.05]\nlook_at = [1.1, 1.2, 1.05]\nfov = 1";
-    let scene = body(folder.path(), [1.0; 3], "sigma_s = 0\nsigma_a = 0\ng = 0\neta = 1.5", camera);
+    let scene = body([1.0; 3], "sigma_s = 0\nsigma_a = 0\ng = 0\neta = 1.5", camera);
     let (image, tally) = render(&scene, 1);
     assert!(image.pixels.iter().all(|p| p.is_black()));
     let found: Vec<_> = tally.walk.losses.each().collect();
@@ -231,7 +202,6 @@ fn total_reflection_for_ever_ends_and_is_counted() {
 /// A coarse body with smooth normals and η below 1, as a bubble in water: what does not pass the surface is mirrored.
 #[test]
 fn a_coarse_bubble_is_a_white_furnace() {
-    let folder = tempfile::tempdir().unwrap();
     for (rings, segments, eta) in [(3, 4, 0.7), (8, 12, 0.9), (3, 4, 1.4)] {
         let text = format!(
             "unit = \"mm\"\n[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nfov = 25\nresolution = [32, 32]\n\
@@ -239,7 +209,7 @@ fn a_coarse_bubble_is_a_white_furnace() {
              material = \"m\"\n[material.m]\ntype = \"translucent\"\nsigma_s = 2\nsigma_a = 0\ng = 0\neta = {eta}\n\
              [environment]\nradiance = 1\n"
         );
-        let (image, tally) = render(&load(&text, folder.path()), 32);
+        let (image, tally) = render(&load(&text), 32);
         assert_eq!(tally.walk.losses.total(), 0);
         even(&image, 1.0, 1e-4, &format!("{rings} x {segments}, eta {eta}"));
     }

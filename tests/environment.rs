@@ -1,17 +1,17 @@
 //! Pictures of the environment: the light they send, and what is said of bad ones.
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
+mod rendering;
+
 use marmor::ErrorKind;
-use marmor::film::{Film, Image, Metadata, PngOptions, Window, save};
-use marmor::integrator::{Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions};
+use marmor::film::{Image, Metadata, PngOptions, Window, save};
+use marmor::integrator::{Direct, Integrator, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
 use marmor::light::Sky;
 use marmor::math::{DVec3, Rgb, Vec3};
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
 use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
+use rendering::{Within, channels, film, load, load_in, mean_of};
 use std::f64::consts::PI;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 const BODY: &str = "unit = \"mm\"\n[camera]\nposition = [0, 20, 0.5]\nlook_at = [0, 0, 0]\nfov = 3\nresolution = [4, 4]\n\
     [[object]]\nname = \"body\"\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 5\nmaterial = \"body\"\n";
@@ -21,35 +21,17 @@ const WAX: &str = "[material.body]\ntype = \"translucent\"\nsigma_s_prime = [2, 
 /// A scene whose environment is `picture`.
 fn scene(folder: &Path, picture: &Image, more: &str) -> Scene {
     save(picture, &folder.join("sky.exr"), &Metadata::default(), PngOptions::default()).unwrap();
-    let text = format!("{BODY}[environment]\nimage = \"sky.exr\"\n{more}");
-    Scene::load(&SceneFile::parse(&text, &folder.join("scene.toml")).unwrap()).unwrap()
+    load_in(folder, &format!("{BODY}[environment]\nimage = \"sky.exr\"\n{more}"))
 }
 
 /// Mean over the picture in green, and its standard error from independent renders.
 fn mean<I: Integrator>(of: impl Fn(u64) -> I, scene: &Scene, passes: u32) -> (f64, f64) {
-    let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
-    let runs = 12;
-    let run = |seed| {
-        let resolution = scene.camera.resolution;
-        let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-        let cancel = AtomicBool::new(false);
-        let job = Job { seed, passes: Some(passes), time: None, cancel: &cancel };
-        render::run(&of(seed), View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-        let image = film.image();
-        image.pixels.iter().map(|p| f64::from(p[1])).sum::<f64>() / image.pixels.len() as f64
-    };
-    let values: Vec<f64> = (1..=runs).map(run).collect();
-    let n = runs as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+    mean_of((1..=12).map(|seed| channels(&film(&of(seed), scene, passes, seed, &mut []).image())[1]))
 }
 
 /// With twelve runs a standard error is itself known to some 20 %: 8 of them stand for 6 of a known one.
 fn agree(a: (f64, f64), b: (f64, f64), what: &str) {
-    let error = a.1.hypot(b.1);
-    assert!(error < 0.03 * b.0, "{what}: too noisy to say anything: {a:?} {b:?}");
-    assert!((a.0 - b.0).abs() < 8.0 * error, "{what}: {a:?} {b:?}");
+    rendering::agree(a, b, Within { errors: 8.0, noise: 0.03 }, what);
 }
 
 fn subsurface(entry: EntrySampling, seed: u64) -> SubsurfaceOptions {
@@ -74,8 +56,7 @@ fn a_picture_of_one_value_lights_as_a_constant_does() {
     let folder = tempfile::tempdir().unwrap();
     let even = Image::from_fn([16, 8], |_, _| Rgb([0.2, 0.5, 0.8]));
     let pictured = scene(folder.path(), &even, WAX);
-    let text = format!("{BODY}[environment]\nradiance = [0.2, 0.5, 0.8]\n{WAX}");
-    let constant = Scene::load(&SceneFile::parse(&text, "scene.toml".as_ref()).unwrap()).unwrap();
+    let constant = load(&format!("{BODY}[environment]\nradiance = [0.2, 0.5, 0.8]\n{WAX}"));
     let body =
         |scene: &Scene| mean(|seed| Subsurface::new(scene, subsurface(EntrySampling::Light, seed)).unwrap(), scene, 8);
     agree(body(&pictured), body(&constant), "subsurface");

@@ -2,13 +2,14 @@
 #![allow(clippy::unwrap_used)] // a scene that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
+mod rendering;
+
 use marmor::bssrdf::{ModelName, ModelOption};
-use marmor::film::{Film, Image, Window};
+use marmor::film::Image;
 use marmor::integrator::{Subsurface, SubsurfaceOptions, View};
 use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
-use marmor::scene::{Estimator, Scene, SceneFile};
-use std::sync::atomic::AtomicBool;
+use marmor::scene::{Estimator, Scene};
+use rendering::{load_in, run};
 
 /// Pixels across a block.
 const BLOCK: usize = 6;
@@ -20,12 +21,7 @@ const CLEAR: &str = "sigma_s_prime = [0.2, 0.3, 0.4]\nsigma_a = [0.002, 0.004, 0
 
 /// The picture of one pass alone.
 fn pass(view: View<'_>, method: &Subsurface, pass: u32) -> Image {
-    let resolution = view.scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap().starting_at(pass);
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed: 3, passes: Some(pass + 1), time: None, cancel: &cancel };
-    render::run(method, view, &job, &mut film, &mut []).unwrap();
-    film.image()
+    run(method, view, 3, pass..pass + 1, &mut []).0.image()
 }
 
 /// Sums over blocks, channel by channel, times `factor`.
@@ -90,8 +86,7 @@ fn set(scene: &mut Scene, model: ModelName) {
 fn compare(scene: &mut Scene, passes: u32, samples: u32) {
     for model in ModelName::models() {
         set(scene, model);
-        let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
-        let rays = query::build(Backend::preferred(), &meshes).unwrap();
+        let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
         let view = View { scene: &*scene, rays: &*rays };
         let reference = method(view.scene, Estimator::All, samples);
         println!(
@@ -110,17 +105,13 @@ fn compare(scene: &mut Scene, passes: u32, samples: u32) {
     }
 }
 
-fn load(text: &str, folder: &std::path::Path) -> Scene {
-    Scene::load(&SceneFile::parse(text, &folder.join("scene.toml")).unwrap()).unwrap()
-}
-
 #[test]
 fn every_estimator_paints_the_lotus_as_the_sum_over_all_samples_does() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/lotus");
     let text = std::fs::read_to_string(folder.join("scene.toml")).unwrap();
     // Clear enough that most models need no near field.
     let text = text.replace("resolution = [512, 512]", "resolution = [24, 24]").replace("preset = \"marble\"", CLEAR);
-    let mut scene = load(&text, &folder);
+    let mut scene = load_in(&folder, &text);
     compare(&mut scene, 20, 4096);
 }
 
@@ -132,7 +123,8 @@ fn every_estimator_paints_a_given_mesh_as_the_sum_over_all_samples_does() {
     let bounds = marmor::geometry::load_obj(&path).unwrap().bounds().unwrap();
     let scale = 100.0 / bounds.extent().max_element();
     let [x, y, z] = (-scale * bounds.centre()).to_array();
-    let mut scene = load(
+    let mut scene = load_in(
+        std::path::Path::new("."),
         &format!(
             "unit = \"mm\"\n[camera]\nposition = [0, 5, 320]\nlook_at = [0, 0, 0]\nfov = 22\nresolution = [96, 96]\n\
              [[object]]\nname = \"body\"\nmaterial = \"milk\"\nmesh = {path:?}\n\
@@ -142,7 +134,6 @@ fn every_estimator_paints_a_given_mesh_as_the_sum_over_all_samples_does() {
              [material.milk]\ntype = \"translucent\"\n{CLEAR}\n\
              [material.lamp]\ntype = \"emissive\"\nradiance = 10\ntwo_sided = true\n"
         ),
-        std::path::Path::new("."),
     );
     compare(&mut scene, 24, 8192);
 }

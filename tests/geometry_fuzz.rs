@@ -3,19 +3,18 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
+mod rendering;
 #[path = "../src/geometry/test_shapes.rs"]
 mod shapes;
 
-use marmor::film::{Film, Window};
 use marmor::geometry::{ObjMesh, write_obj};
 use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
 use marmor::math::{DAffine3, DVec3, hash, unit_f64};
 use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
-use marmor::scene::{ObstacleKind, Orders, Scene, SceneFile};
+use marmor::scene::{ObstacleKind, Orders, Scene};
 use marmor::tally::TOLERATED;
+use rendering::{backends, load_in, mean_of, run};
 use shapes::{cuboid, joined};
-use std::sync::atomic::AtomicBool;
 
 /// Numbers of one scene.
 struct Dice(u64);
@@ -260,7 +259,7 @@ fn scene(number: u64) -> (Scene, Vec<(Placed, f64)>) {
         eye.to_array(),
         middle.to_array()
     );
-    (Scene::load(&SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap()).unwrap(), placed)
+    (load_in(folder.path(), &text), placed)
 }
 
 /// Share of the area of a mesh below which parts that are badly placed are no reason to refuse it.
@@ -270,7 +269,7 @@ const MINOR: f64 = 1e-3;
 fn no_scene_is_both_accepted_and_wrong() {
     let count = std::env::var("MARMOR_GEOMETRY_SCENES").map_or(270, |n| n.parse().unwrap());
     let (mut accepted, mut paths, mut lost, mut worst) = (0, 0, 0, 0.0_f64);
-    let backends: Vec<Backend> = Backend::ALL.into_iter().filter(|b| b.is_built_in()).collect();
+    let backends: Vec<Backend> = backends().collect();
     for number in 0..count {
         let (scene, placed) = scene(number);
         let refusals = traceable(&scene);
@@ -295,11 +294,8 @@ fn no_scene_is_both_accepted_and_wrong() {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed: number };
         let method = VolumePath::new(&scene, options).unwrap();
         let render = |passes: u32| {
-            let mut film = Film::new([8, 8], Window::full([8, 8])).unwrap();
-            let cancel = AtomicBool::new(false);
-            let job = Job { seed: number, passes: Some(passes), time: None, cancel: &cancel };
             let view = View { scene: &scene, rays: &*rays };
-            let outcome = render::run(&method, view, &job, &mut film, &mut []).unwrap();
+            let (film, outcome) = run(&method, view, number, 0..passes, &mut []);
             (film, outcome.tally.walk)
         };
         let (mut film, mut walk) = render(16);
@@ -313,9 +309,7 @@ fn no_scene_is_both_accepted_and_wrong() {
             "{:?} in {what}",
             marmor::integrator::lost(&walk, &scene)
         );
-        let pixels: Vec<f64> = film.image().pixels.iter().map(|p| f64::from(p.mean())).collect();
-        let mean = pixels.iter().sum::<f64>() / 64.0;
-        let error = (pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / 63.0 / 64.0).sqrt();
+        let (mean, error) = mean_of(film.image().pixels.iter().map(|p| f64::from(p.mean())));
         // f32 in a sum of a thousand.
         assert!((mean - 1.0).abs() <= 5.0 * error + 1e-5, "{mean} +- {error} in {what}");
         worst = worst.max((mean - 1.0).abs());

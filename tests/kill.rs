@@ -6,6 +6,9 @@
 #![cfg(all(feature = "cli", unix))]
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
+mod command;
+
+use command::{ball, folder};
 use marmor::film::Checkpoint;
 use marmor::math::hash;
 use std::fs;
@@ -16,33 +19,9 @@ use std::time::{Duration, Instant};
 /// Between two checkpoints.
 const INTERVAL: Duration = Duration::from_millis(30);
 
-const SCENE: &str = r#"
-unit = "mm"
-[camera]
-position = [0, 2, 6]
-look_at = [0, 0, 0]
-fov = 30
-resolution = [96, 72]
-[[object]]
-shape = "sphere"
-centre = [0, 0, 0]
-radius = 1
-material = "wax"
-[environment]
-radiance = 1
-[material.wax]
-type = "translucent"
-sigma_s_prime = [2, 3, 4]
-sigma_a = [0.05, 0.1, 0.2]
-eta = 1.3
-[method]
-cache_samples = 500
-"#;
-
 fn marmor(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_marmor"));
-    command.current_dir(folder).args(arguments).env("SOURCE_DATE_EPOCH", "1700000000");
-    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut command = command::command(folder, arguments);
+    command.env("SOURCE_DATE_EPOCH", "1700000000").stdout(Stdio::null()).stderr(Stdio::null());
     command
 }
 
@@ -68,9 +47,8 @@ fn recorded(folder: &Path, upto: u64) -> (u64, f64) {
 #[test]
 fn renders_that_are_killed_lose_one_interval_at_most() {
     let kills: u32 = std::env::var("MARMOR_KILLS").ok().and_then(|v| v.parse().ok()).unwrap_or(5);
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder(&ball([96, 72], "[environment]\nradiance = 1\n[method]\ncache_samples = 500\n"));
     let folder = folder.path();
-    fs::write(folder.join("scene.toml"), SCENE).unwrap();
     // As many passes as take a second or so.
     let start = Instant::now();
     assert!(marmor(folder, &["render", "scene.toml", "-o", "old.exr", "--spp", "4"]).status().unwrap().success());

@@ -3,21 +3,19 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
 use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOption, SingleScattering};
-use marmor::film::{Counts, Film, Image, Window};
+use marmor::film::{Counts, Film, Image};
 use marmor::integrator::{
-    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions,
 };
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::{reflectance, transmittance};
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
-use marmor::scene::{Estimator, Orders, Scene, SceneFile};
+use marmor::query::Backend;
+use marmor::scene::{Estimator, Orders, Scene};
 use marmor::tally::Tally;
-use rendering::backends;
+use rendering::{average, backends, channels, load_beside, mean_of, means_of, on};
 use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::ops::Range;
-use std::sync::atomic::AtomicBool;
 
 mod rendering;
 
@@ -73,10 +71,7 @@ impl Built {
     }
 
     fn load(&self) -> Scene {
-        let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("mesh.obj"), &self.obj).unwrap();
-        let scene = Scene::load(&SceneFile::parse(&self.text, &folder.path().join("s.toml")).unwrap());
-        scene.unwrap_or_else(|e| panic!("{e}\n{}", self.text))
+        load_beside("mesh.obj", &self.obj, &self.text)
     }
 }
 
@@ -145,23 +140,7 @@ fn options(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions {
 }
 
 fn film<I: Integrator>(method: &I, scene: &Scene, backend: Backend, passes: Range<u32>) -> (Film, Tally) {
-    film_of_seed(3, method, scene, backend, passes)
-}
-
-fn film_of_seed<I: Integrator>(
-    seed: u64,
-    method: &I,
-    scene: &Scene,
-    backend: Backend,
-    passes: Range<u32>,
-) -> (Film, Tally) {
-    let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
-    let rays = query::build(backend, &meshes).unwrap();
-    let resolution = scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap().starting_at(passes.start);
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed, passes: Some(passes.end), time: None, cancel: &cancel };
-    let outcome = render::run(method, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    let (film, outcome) = on(backend, scene, method, 3, passes);
     (film, outcome.tally)
 }
 
@@ -316,20 +295,12 @@ fn law_3_energy_furnaces_are_one() {
                 total += once;
                 (0..3).for_each(|c| found_by_quadrature[c] += f64::from(once[c]));
             }
-            let runs: Vec<Image> = (1..=10)
-                .map(|seed| {
-                    let method = Subsurface::new(&scene, SubsurfaceOptions { seed, ..options(Estimator::Cut, 4096) });
-                    film_of_seed(seed, &method.unwrap(), &scene, backend, 0..24).0.image()
-                })
-                .collect();
-            for c in 0..3 {
-                let means: Vec<f64> = runs
-                    .iter()
-                    .map(|image| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / image.pixels.len() as f64)
-                    .collect();
-                let n = means.len() as f64;
-                let mean = means.iter().sum::<f64>() / n;
-                let error = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+            let run = |seed| {
+                let method = Subsurface::new(&scene, SubsurfaceOptions { seed, ..options(Estimator::Cut, 4096) });
+                channels(&on(backend, &scene, &method.unwrap(), seed, 0..24).0.image())
+            };
+            let found = means_of(&(1..=10).map(run).collect::<Vec<_>>());
+            for (c, (mean, error)) in found.into_iter().enumerate() {
                 let expected = t21 * if by_direction { found_by_quadrature[c] } else { f64::from(total[c]) } + mirror;
                 let what = format!("{} on {}, channel {c}", model.name(), backend.name());
                 assert!(error < 0.02 * expected, "{what}: too noisy to say anything: {mean} +- {error}");
@@ -351,16 +322,10 @@ fn law_3_energy_furnaces_are_one() {
         s.camera([0.0, 0.0, 6.0], [0.0, 0.0, 0.0], 10.0);
         let _ = write!(s.text, "[environment]\nradiance = 1\n[[object]]\n{white}");
         let body = s.load();
-        let means: Vec<f64> = (1..=10)
-            .map(|seed| {
-                let options = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed };
-                let image =
-                    film_of_seed(seed, &VolumePath::new(&body, options).unwrap(), &body, backend, 0..48).0.image();
-                image.pixels.iter().map(|p| f64::from(p.mean())).sum::<f64>() / image.pixels.len() as f64
-            })
-            .collect();
-        let mean = means.iter().sum::<f64>() / 10.0;
-        let error = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 90.0).sqrt();
+        let (mean, error) = mean_of((1..=10).map(|seed| {
+            let options = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed };
+            average(&on(backend, &body, &VolumePath::new(&body, options).unwrap(), seed, 0..48).0.image())
+        }));
         // 2 % would be noticed.
         assert!(error < 2e-3 && (mean - 1.0).abs() < 8.0 * error + 1e-4, "volume_path: {mean} +- {error}");
         let image = film(&AmbientOcclusion { radius: f32::INFINITY, rays: 4 }, &scene, backend, 0..4).0.image();

@@ -4,8 +4,10 @@
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
 mod command;
+mod parts;
 
 use exr::prelude::*;
+use parts::{camera, diffuse, rectangle, sky, sphere, translucent};
 use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
@@ -13,44 +15,13 @@ use std::process::Output;
 
 /// A ball of radius 2 at (10, 0, 0), its transport mean free path 0.5: radius 4, thickness 8 of them. A floor below.
 fn scene(model: &str) -> String {
-    format!(
-        r#"
-unit = "mm"
-[camera]
-position = [10, 0, 12]
-look_at = [10, 0, 0]
-fov = 24
-resolution = [24, 24]
-[[object]]
-name = "ball"
-shape = "sphere"
-centre = [10, 0, 0]
-radius = 2
-rings = 96
-segments = 192
-material = "wax"
-[[object]]
-name = "floor"
-shape = "rectangle"
-centre = [10, -2.2, 0]
-edge_u = [0, 0, 4]
-edge_v = [4, 0, 0]
-material = "grey"
-[material.wax]
-type = "translucent"
-sigma_s_prime = 1.998
-sigma_a = 0.002
-eta = 1.3
-model = "{model}"
-[material.grey]
-type = "diffuse"
-albedo = [0.2, 0.4, 0.6]
-[environment]
-radiance = 1
-[method]
-cache_samples = 200
-"#
-    )
+    camera([10.0, 0.0, 12.0], [10.0, 0.0, 0.0], 24.0, [24, 24])
+        + &sphere("ball", [10.0, 0.0, 0.0], 2.0, 96, "wax")
+        + &rectangle("floor", [10.0, -2.2, 0.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0], "grey")
+        + &translucent("wax", &format!("sigma_s_prime = 1.998\nsigma_a = 0.002\neta = 1.3\nmodel = \"{model}\""))
+        + &diffuse("grey", [0.2, 0.4, 0.6])
+        + &sky(1)
+        + "[method]\ncache_samples = 200\n"
 }
 
 fn folder(model: &str) -> tempfile::TempDir {

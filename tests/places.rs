@@ -2,19 +2,17 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // figures for docs/rays.md
 
-use marmor::film::{Film, Window};
 use marmor::geometry::Precision;
 use marmor::integrator::{View, VolumePath, VolumePathOptions};
 use marmor::light::Lights;
-use marmor::math::{Rgb, Vec3, hash, unit_f32};
+use marmor::math::{Vec3, hash, unit_f32};
 use marmor::query::{self, Backend, Ray};
-use marmor::render::{self, Job};
-use marmor::scene::{Orders, Scene, SceneFile};
+use marmor::scene::{Orders, Scene};
 use marmor::tally::WalkTally;
-use rendering::backends;
-use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use parts::centred;
+use rendering::{backends, channels, load, load_beside, mean_of, on};
 
+mod parts;
 mod rendering;
 
 /// The slab of [van de Hulst 1980] that Monte Carlo programs are held against: light along the normal, 0.2 mm thick, n = 1.
@@ -37,14 +35,7 @@ struct Place {
 impl Place {
     fn scene(&self, medium: &str) -> Scene {
         let Self { width, thickness, floor, rotate: [x, y, z] } = *self;
-        let folder = tempfile::tempdir().unwrap();
-        let mut obj = String::new();
-        for i in 0..8 {
-            let at = |bit: u32, edge: f64| if i >> bit & 1 == 0 { -0.5 * edge } else { 0.5 * edge };
-            obj += &format!("v {:e} {:e} {:e}\n", at(0, width), at(1, thickness), at(2, width));
-        }
-        obj += "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
-        std::fs::write(folder.path().join("slab.obj"), obj).unwrap();
+        let half = [0.5 * width, 0.5 * thickness, 0.5 * width];
         let below = if floor > 0.0 {
             format!(
                 "[[object]]\nname = \"floor\"\nshape = \"rectangle\"\ncentre = [0, {:e}, 0]\nedge_u = [0, 0, {floor:e}]\n\
@@ -61,7 +52,7 @@ impl Place {
              [material.m]\ntype = \"translucent\"\n{medium}\n{below}[method]\nname = \"volume_path\"\n",
             50.0 * thickness
         );
-        Scene::load(&SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap()).unwrap()
+        load_beside("slab.obj", &centred(half), &text)
     }
 }
 
@@ -223,16 +214,9 @@ fn a_render_of_a_wide_slab_has_all_its_light() {
         let camera = marmor::scene::Camera::new([32, 32], up.as_dvec3() * 10.0, -up, Vec3::Z, 0.004, 0.004).unwrap();
         scene.camera = camera;
         for backend in backends() {
-            let rays = query::build(backend, &scene.meshes()).unwrap();
             let method = VolumePath::new(&scene, options(Orders::All)).unwrap();
-            let mut film = Film::new([32, 32], Window::full([32, 32])).unwrap();
-            let cancel = AtomicBool::new(false);
-            let job = Job { seed: 1, passes: Some(16), time: None, cancel: &cancel };
-            render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-            let values: Vec<f64> = film.image().pixels.iter().map(|p| f64::from(p[0])).collect();
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let error = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+            let (film, _) = on(backend, &scene, &method, 1, 0..16);
+            let (mean, error) = mean_of(film.image().pixels.iter().map(|p| f64::from(p[0])));
             let expected = REFLECTED + TRANSMITTED;
             assert!(error < 0.005 && (mean - expected).abs() < 4.0 * error, "{width}: {mean} ± {error}");
         }
@@ -279,15 +263,10 @@ fn a_lamp_far_away_does_not_coarsen_a_body() {
              [material.a]\ntype = \"translucent\"\nsigma_s_prime = [3, 5, 7]\nsigma_a = [0.001, 0.01, 0.1]\neta = 1.3\n\
              [material.lamp]\ntype = \"emissive\"\nradiance = 1\ntwo_sided = true\n"
         );
-        let scene = Scene::load(&SceneFile::parse(&text, Path::new("scene.toml")).unwrap()).unwrap();
+        let scene = load(&text);
         assert_eq!(scene.why_double, None);
-        let rays = query::build(backend, &scene.meshes()).unwrap();
         let method = VolumePath::new(&scene, VolumePathOptions { photons: 2000, ..options(Orders::All) }).unwrap();
-        let mut film = Film::new([24, 24], Window::full([24, 24])).unwrap();
-        let cancel = AtomicBool::new(false);
-        let job = Job { seed: 1, passes: Some(12), time: None, cancel: &cancel };
-        render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-        film.image().pixels.iter().fold(Rgb::BLACK, |sum, p| sum + *p) * (1.0 / 576.0)
+        channels(&on(backend, &scene, &method, 1, 0..12).0.image())
     };
     for backend in backends() {
         let [near, far] = [1e3, 1e6].map(|distance| mean(distance, backend));
@@ -315,7 +294,7 @@ fn a_small_lamp_in_the_middle_of_a_wide_scene_does_not_shade_itself() {
         plane(5.0, 100.0, "grey"),
         plane(0.0, 0.02, "lamp")
     );
-    let mut scene = Scene::load(&SceneFile::parse(&text, Path::new("scene.toml")).unwrap()).unwrap();
+    let mut scene = load(&text);
     assert_eq!(scene.why_double, None);
     for precision in [Precision::Single, Precision::Double] {
         scene.objects.iter_mut().for_each(|o| o.mesh.precision = precision);

@@ -3,18 +3,17 @@
 #![allow(clippy::unwrap_used)] // a command that does not start or a file that is not there has failed the test
 
 mod command;
+mod rendering;
 
 use command::{ball, marmor, text, two_lamps};
-use marmor::film::{Film, Window};
 use marmor::integrator::{AmbientOcclusion, View};
 use marmor::query::{self, Backend};
-use marmor::render::{self, Job, Observer, Progress};
-use marmor::scene::{Scene, SceneFile};
+use marmor::render::{Observer, Progress};
+use rendering::{load, run};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 /// All keys of an object, those of objects in it as `outer.inner`.
@@ -83,16 +82,12 @@ impl Observer for Slow {
 
 #[test]
 fn the_clock_stands_while_observers_measure_and_write() {
-    let file = SceneFile::parse(&ball([24, 16], "[environment]\nradiance = 1\n"), Path::new("test.toml")).unwrap();
-    let scene = Scene::load(&file).unwrap();
+    let scene = load(&ball([24, 16], "[environment]\nradiance = 1\n"));
     let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
-    let mut film = Film::new([24, 16], Window::full([24, 16])).unwrap();
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed: 1, passes: Some(10), time: None, cancel: &cancel };
     let mut slow = Slow { since: Instant::now(), at_work: 0.0, told: 0.0 };
     let method = AmbientOcclusion { radius: f32::INFINITY, rays: 1 };
     let view = View { scene: &scene, rays: &*rays };
-    let outcome = render::run(&method, view, &job, &mut film, &mut [&mut slow]).unwrap();
+    let (_, outcome) = run(&method, view, 1, 0..10, &mut [&mut slow]);
     // Whatever the machine does: what is told lies within the time that was not spent in the observer.
     assert!(slow.told > 0.0 && slow.told <= slow.at_work, "{} s told, {} s at work", slow.told, slow.at_work);
     assert_eq!(outcome.seconds.total(), slow.told);

@@ -8,7 +8,7 @@ use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::optics::{FresnelMoments, Medium};
 use proptest::prelude::*;
 use std::f64::consts::PI;
-use support::{AnyInput, Row, Score, any_input, both, channel, direction, grey};
+use support::{AnyInput, Row, Score, any_input, both, channel, channels_are_grey_media, direction, grey};
 
 fn score(rows: &[Row]) -> Score {
     let mut score = Score::default();
@@ -155,13 +155,7 @@ fn a_medium_without_scattering_gives_nothing() {
 #[test]
 fn channels_do_not_know_each_other() {
     let medium = skin();
-    let all = model(&medium);
-    let (entry, exit) = (entry(0.7), exit_at(Vec3::new(1.0, -0.5, 0.0)));
-    for c in 0..3 {
-        let one = model(&grey(medium.sigma_s[c], medium.sigma_a[c], 0.0, 1.3));
-        assert_eq!(all.eval(&entry, &exit)[c], one.eval(&entry, &exit)[0]);
-        assert_eq!(all.total()[c], one.total()[0]);
-    }
+    channels_are_grey_media(&medium, model, &entry(0.7), &exit_at(Vec3::new(1.0, -0.5, 0.0)));
 }
 
 proptest! {

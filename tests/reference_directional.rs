@@ -8,7 +8,7 @@ use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::optics::{FresnelMoments, Medium};
 use proptest::prelude::*;
 use std::f32::consts::PI;
-use support::{AnyInput, Row, Score, any_input, both, channel, direction, grey, table};
+use support::{AnyInput, Row, Score, any_input, both, channel, channels_are_grey_media, direction, grey, table};
 
 fn vectors(row: &Row) -> [DVec3; 4] {
     [["x", "y", "z"], ["nix", "niy", "niz"], ["wx", "wy", "wz"], ["nox", "noy", "noz"]]
@@ -165,14 +165,9 @@ fn the_reduced_intensity_part_is_attenuated_by_delta_eddington_extinction() {
 #[test]
 fn channels_do_not_know_each_other() {
     let medium = Medium { sigma_s: Rgb([0.74, 0.88, 1.01]), sigma_a: Rgb([0.032, 0.17, 0.48]), g: 0.2, eta: 1.3 };
-    let all = DirectionalDipole::new(&medium, true);
     let entry = Entry { x: Vec3::ZERO, n: UP, w: Vec3::new(0.6, 0.0, -0.8) };
     let exit = Exit { x: Vec3::new(1.0, -0.5, 0.1), n: UP, w: UP };
-    for c in 0..3 {
-        let one = DirectionalDipole::new(&grey(medium.sigma_s[c], medium.sigma_a[c], 0.2, 1.3), true);
-        assert_eq!(all.eval(&entry, &exit)[c], one.eval(&entry, &exit)[0]);
-        assert_eq!(all.total()[c], one.total()[0]);
-    }
+    channels_are_grey_media(&medium, |medium| DirectionalDipole::new(medium, true), &entry, &exit);
 }
 
 proptest! {

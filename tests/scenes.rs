@@ -1,27 +1,19 @@
 //! Small scenes whose radiance is known on paper, rendered through the whole library by every backend of the build.
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
-use marmor::film::{Film, Image, Window};
-use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View};
+use marmor::film::Image;
+use marmor::integrator::{AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions};
 use marmor::math::Rgb;
 use marmor::optics::{FresnelMoments, reflectance, transmittance};
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
+use marmor::query::Backend;
 use marmor::sampling::Points;
 use marmor::scene::{EntrySampling, Estimator, Scene};
-use rendering::{backends, load, options};
-use std::sync::atomic::AtomicBool;
+use rendering::{Within, agree, backends, channels, load, mean_of, on, options};
 
 mod rendering;
 
 fn render<I: Integrator>(integrator: &I, scene: &Scene, backend: Backend, passes: u32, seed: u64) -> Image {
-    let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
-    let rays = query::build(backend, &meshes).unwrap();
-    let resolution = scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed, passes: Some(passes), time: None, cancel: &cancel };
-    render::run(integrator, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    let film = on(backend, scene, integrator, seed, 0..passes).0;
     assert_eq!(film.counts().non_finite, 0);
     film.image()
 }
@@ -34,24 +26,24 @@ fn mean<I: Integrator>(
     passes: u32,
     channel: usize,
 ) -> (f64, f64) {
-    let runs = 12;
-    let values: Vec<f64> = (1..=runs)
-        .map(|seed| {
-            let image = render(&of(seed), scene, backend, passes, seed);
-            image.pixels.iter().map(|p| f64::from(p[channel])).sum::<f64>() / image.pixels.len() as f64
-        })
-        .collect();
-    let n = f64::from(runs as u32);
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
+    mean_of((1..=12).map(|seed| channels(&render(&of(seed), scene, backend, passes, seed))[channel]))
 }
 
 /// With twelve runs the standard error itself is known to some 20 %: 8 of them stand for 6 of a known one.
-fn assert_mean((mean, error): (f64, f64), expected: f64, what: &str) {
-    assert!(error < 0.02 * expected.abs(), "{what}: the test is too noisy to say anything: {mean} +- {error}");
-    let deviation = (mean - expected) / error;
-    assert!(deviation.abs() < 8.0, "{what}: {mean} +- {error}, expected {expected}: {deviation:.1} standard errors");
+fn assert_mean(found: (f64, f64), expected: f64, what: &str) {
+    agree(found, (expected, 0.0), WITHIN, what);
+}
+
+const WITHIN: Within = Within { errors: 8.0, noise: 0.02 };
+
+/// What tests of means rest on sees a mean that is off, and says where it could not.
+#[test]
+fn means_that_are_off_and_means_that_say_nothing_are_refused() {
+    let (mean, error) = mean_of([9.0, 10.0, 11.0, 10.0]);
+    assert!(mean == 10.0 && (error - (2.0_f64 / 3.0 / 4.0).sqrt()).abs() < 1e-12, "{mean} +- {error}");
+    let refused = |b: (f64, f64)| std::panic::catch_unwind(|| agree((1.0, 0.01), b, WITHIN, "planted")).is_err();
+    assert!(!refused((1.07, 0.0)) && refused((1.09, 0.0)) && refused((0.91, 0.0)) && !refused((1.1, 0.01)));
+    assert!(refused((1.0, 0.03)) && !refused((1.0, 0.01)));
 }
 
 /// A camera straight above the origin that sees a spot of some 0.002 units there.
@@ -244,12 +236,9 @@ fn every_way_to_fill_the_cache_has_the_same_mean() {
             0,
         )
     };
-    let (expected, expected_error) = run(EntrySampling::Light, Points::Sobol);
+    let expected = run(EntrySampling::Light, Points::Sobol);
     for (entry, points) in [(EntrySampling::Cosine, Points::Sobol), (EntrySampling::Cosine, Points::Independent)] {
-        let (found, error) = run(entry, points);
-        let both = error.hypot(expected_error);
-        assert!(both < 0.02 * expected);
-        assert!((found - expected).abs() < 8.0 * both, "{entry:?}, {points:?}: {found} against {expected} +- {both}");
+        agree(run(entry, points), expected, WITHIN, &format!("{entry:?}, {points:?}"));
     }
 }
 

@@ -8,56 +8,23 @@ use marmor::math::{Rgb, hash_combine};
 use marmor::render::{Observer, Progress};
 use marmor::sampling::Points;
 use marmor::scene::{Estimator, Scene};
+use parts::{WAX, camera, diffuse, emissive, rectangle, sky, sphere, translucent};
 use rendering::{film, load, options, subsurface};
 
+mod parts;
 mod rendering;
 
-const WORLD: &str = r#"
-    unit = "mm"
-    [camera]
-    position = [0, 2.5, 6]
-    look_at = [0, 0.1, 0]
-    fov = 26
-    resolution = [32, 24]
-    [[object]]
-    name = "ball"
-    shape = "sphere"
-    centre = [0, 0, 0]
-    radius = 1
-    rings = 24
-    segments = 48
-    material = "BALL"
-    [[object]]
-    name = "floor"
-    shape = "rectangle"
-    centre = [0, -1, 0]
-    edge_u = [0, 0, 4]
-    edge_v = [4, 0, 0]
-    material = "grey"
-    [[object]]
-    name = "lamp"
-    shape = "rectangle"
-    centre = [2, 4, 1]
-    edge_u = [1.5, 0, 0]
-    edge_v = [0, 0, 1.5]
-    material = "lamp"
-    [material.grey]
-    type = "diffuse"
-    albedo = 0.5
-    [material.wax]
-    type = "translucent"
-    sigma_s_prime = [2, 3, 4]
-    sigma_a = [0.05, 0.1, 0.2]
-    eta = 1.3
-    [material.lamp]
-    type = "emissive"
-    radiance = 5
-    [environment]
-    radiance = ENVIRONMENT
-"#;
-
+/// A ball of this material on a floor under a lamp.
 fn world(ball: &str, environment: f32) -> Scene {
-    load(&WORLD.replace("BALL", ball).replace("ENVIRONMENT", &environment.to_string()))
+    let text = camera([0.0, 2.5, 6.0], [0.0, 0.1, 0.0], 26.0, [32, 24])
+        + &sphere("ball", [0.0; 3], 1.0, 24, ball)
+        + &rectangle("floor", [0.0, -1.0, 0.0], [0.0, 0.0, 4.0], [4.0, 0.0, 0.0], "grey")
+        + &rectangle("lamp", [2.0, 4.0, 1.0], [1.5, 0.0, 0.0], [0.0, 0.0, 1.5], "lamp")
+        + &diffuse("grey", 0.5)
+        + &translucent("wax", WAX)
+        + &emissive("lamp", 5)
+        + &sky(environment);
+    load(&text)
 }
 
 /// Measures after each pass, as records do, and keeps what is said after some.

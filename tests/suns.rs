@@ -3,20 +3,20 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
+mod parts;
 mod rendering;
 
-use marmor::film::{Film, Image, Window};
-use marmor::integrator::{FirstOrder, Integrator, View, VolumePath, VolumePathOptions};
+use marmor::film::Image;
+use marmor::integrator::{FirstOrder, Integrator, VolumePath, VolumePathOptions};
 use marmor::light::Lights;
 use marmor::math::{DVec3, Rgb};
 use marmor::optics::{HenyeyGreenstein, transmittance};
-use marmor::query::{self, Backend};
-use marmor::render::{self, Job};
-use marmor::scene::{Environment, Orders, Scene, SceneFile};
-use rendering::{film, load};
+use marmor::query::Backend;
+use marmor::scene::{Environment, Orders, Scene};
+use parts::cuboid;
+use rendering::{Within, average, film, load, load_beside, mean_of, on};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 const OPTIONS: VolumePathOptions = VolumePathOptions { orders: Orders::All, photons: 1024, specular: false, seed: 1 };
 
@@ -32,25 +32,13 @@ fn under(mut scene: Scene, resolution: [u32; 2], value: impl Fn(DVec3) -> f64) -
     scene
 }
 
-/// One picture's samples.
-fn image(scene: &Scene, method: &impl Integrator, seed: u64, passes: u32) -> Vec<Rgb> {
-    film(method, scene, passes, seed, &mut []).image().pixels
+fn image(scene: &Scene, method: &impl Integrator, seed: u64, passes: u32) -> Image {
+    film(method, scene, passes, seed, &mut []).image()
 }
 
-const RUNS: u64 = 16;
-
-/// Mean over independent runs, and its standard error.
+/// Mean over sixteen independent runs, and its standard error.
 fn over_runs(run: impl Fn(u64) -> f64) -> (f64, f64) {
-    let values: Vec<f64> = (1..=RUNS).map(run).collect();
-    let n = RUNS as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean, (variance / n).sqrt())
-}
-
-/// Mean over the picture and the channels.
-fn average(pixels: &[Rgb]) -> f64 {
-    pixels.iter().map(|p| f64::from(p.mean())).sum::<f64>() / pixels.len() as f64
+    mean_of((1..=16).map(run))
 }
 
 fn mean(scene: &Scene, options: VolumePathOptions, passes: u32) -> (f64, f64) {
@@ -58,14 +46,9 @@ fn mean(scene: &Scene, options: VolumePathOptions, passes: u32) -> (f64, f64) {
     over_runs(|seed| average(&image(scene, &of(seed), seed, passes)))
 }
 
-/// Within 4 standard errors, which are below the share `most` of the value: of 16 runs Student's law passes a fair pair with
-/// a chance of 99.9 %, and the seeds are always the same.
-fn agree(a: (f64, f64), b: (f64, f64), most: f64, what: &str) {
-    let error = a.1.hypot(b.1);
-    let z = (a.0 - b.0) / error;
-    println!("{what}: {:.5} +- {:.5} against {:.5} +- {:.5}, z {z:.2}", a.0, a.1, b.0, b.1);
-    assert!(error < most * b.0, "{what}: too noisy to say anything: {a:?} {b:?}");
-    assert!(z.abs() < 4.0, "{what}: {a:?} against {b:?}, z {z}");
+/// Of 16 runs Student's law passes a fair pair with a chance of 99.9 %, and the seeds are always the same.
+fn agree(a: (f64, f64), b: (f64, f64), noise: f64, what: &str) {
+    rendering::agree(a, b, Within { errors: 4.0, noise }, what);
 }
 
 /// A ball of radius 1 at the origin, seen from z = 5; eight pixels a side, all of them on the ball.
@@ -174,23 +157,14 @@ fn many_orders_under_a_sun_are_those_under_a_lamp_path_by_path() {
 /// T T E μ_s σ_s/σ_t p / (η² (μ_s' + μ_o')). To a third of a per cent.
 #[test]
 fn first_order_of_a_half_space_under_a_sun() {
-    let folder = tempfile::tempdir().unwrap();
-    let mut text = String::new();
-    for y in [0.0, -30.0] {
-        for [x, z] in [[-30, -30], [-30, 30], [30, 30], [30, -30]] {
-            text += &format!("v {x} {y} {z}\n");
-        }
-    }
-    text += "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
-    std::fs::write(folder.path().join("slab.obj"), text).unwrap();
     for (eta, g) in [(1.0_f64, 0.0), (1.3, 0.7), (0.8, -0.3)] {
         let text = format!(
             "unit = \"mm\"\n[camera]\nposition = [0, 20, 0]\nlook_at = [0, 0, 0]\nup = [0, 0, 1]\nfov = 1\nresolution = [8, 8]\n\
              [[object]]\nmesh = \"slab.obj\"\nmaterial = \"m\"\n[material.m]\ntype = \"translucent\"\nsigma_s = 0.8\nsigma_a = 0.2\n\
              g = {g}\neta = {eta}\n"
         );
-        let file = SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap();
-        let scene = sunny(Scene::load(&file).unwrap(), 0.0);
+        let slab = cuboid([-30.0, -30.0, -30.0], [30.0, 0.0, 30.0]);
+        let scene = sunny(load_beside("slab.obj", &slab, &text), 0.0);
         let (w, solid) = sun();
         let inside = (1.0 - (1.0 - w.y * w.y) / (eta * eta)).sqrt();
         let passed = f64::from(transmittance(eta as f32, w.y as f32) * transmittance(eta as f32, 1.0));
@@ -245,13 +219,8 @@ fn suns_change_the_noise_alone_among_all_kinds_of_surfaces() {
 fn a_sun_that_is_not_met_is_named() {
     let not_met = |medium: &str| {
         let scene = sunny(ball(medium, ""), 0.1);
-        let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
         let method = VolumePath::new(&scene, OPTIONS).unwrap();
-        let mut film = Film::new([8, 8], Window::full([8, 8])).unwrap();
-        let cancel = AtomicBool::new(false);
-        let job = Job { seed: 1, passes: Some(8), time: None, cancel: &cancel };
-        let view = View { scene: &scene, rays: &*rays };
-        let outcome = render::run(&method, view, &job, &mut film, &mut []).unwrap();
+        let (film, outcome) = on(Backend::preferred(), &scene, &method, 1, 0..8);
         method.lights(&scene).not_met(&outcome.tally, film.counts().samples)
     };
     assert_eq!(
@@ -266,7 +235,7 @@ fn a_sun_that_is_not_met_is_named() {
 fn a_white_medium_vanishes_under_a_white_picture() {
     let scene = under(ball("sigma_s = 8\nsigma_a = 0\ng = 0.5\neta = 1.4", ""), [64, 32], |_| 1.0);
     let method = VolumePath::new(&scene, VolumePathOptions { specular: true, ..OPTIONS }).unwrap();
-    for pixel in image(&scene, &method, 1, 8) {
+    for pixel in image(&scene, &method, 1, 8).pixels {
         assert!((pixel[0] - 1.0).abs() < 1e-5 && pixel.is_grey(), "{pixel:?}");
     }
 }

@@ -8,42 +8,21 @@ use marmor::integrator::SubsurfaceOptions;
 use marmor::render::{Observer, Progress};
 use marmor::report::{Convergence, ErrorCurve, ErrorPoint};
 use marmor::scene::{Estimator, Scene};
+use parts::{WAX, camera, emissive, rectangle, sphere, translucent};
 use rendering::{film, load, options, subsurface};
 
+mod parts;
 mod rendering;
 
 /// A ball lit from behind by a small and very bright lamp, which some pixels at its rim reflect.
-const BACK_LIT: &str = r#"
-    unit = "mm"
-    [camera]
-    position = [0, 1, 6]
-    look_at = [0, 0, 0]
-    fov = 24
-    resolution = [48, 36]
-    [[object]]
-    name = "ball"
-    shape = "sphere"
-    centre = [0, 0, 0]
-    radius = 1
-    rings = 24
-    segments = 48
-    material = "wax"
-    [[object]]
-    name = "lamp"
-    shape = "rectangle"
-    centre = [0, 4, -6]
-    edge_u = [0.2, 0, 0]
-    edge_v = [0, 0.15, 0.1]
-    material = "lamp"
-    [material.wax]
-    type = "translucent"
-    sigma_s_prime = [2, 3, 4]
-    sigma_a = [0.05, 0.1, 0.2]
-    eta = 1.3
-    [material.lamp]
-    type = "emissive"
-    radiance = 3000
-"#;
+fn back_lit() -> Scene {
+    let text = camera([0.0, 1.0, 6.0], [0.0; 3], 24.0, [48, 36])
+        + &sphere("ball", [0.0; 3], 1.0, 24, "wax")
+        + &rectangle("lamp", [0.0, 4.0, -6.0], [0.2, 0.0, 0.0], [0.0, 0.15, 0.1], "lamp")
+        + &translucent("wax", WAX)
+        + &emissive("lamp", 3000);
+    load(&text)
+}
 
 /// A way to render, with the seconds that a pass is taken to last: no clock decides here.
 struct Way {
@@ -132,7 +111,7 @@ fn agree(a: &Estimate, b: &Estimate) -> bool {
 #[test]
 fn seeds_do_not_contradict_each_other() {
     use rayon::prelude::*;
-    let scene = load(BACK_LIT);
+    let scene = back_lit();
     let reports: Vec<Convergence> = (1..=6_u64).into_par_iter().map(|seed| report(&scene, seed)).collect();
     let said: Vec<String> = reports.iter().map(|r| r.sentences().join("\n")).collect();
     let all_said = said.join("\n\n");

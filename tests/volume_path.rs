@@ -2,23 +2,21 @@
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
+mod parts;
+mod rendering;
 mod support;
 
-use marmor::film::{Film, Image, Window};
+use marmor::film::Image;
 use marmor::integrator::{Left, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::reflectance;
 use marmor::query::{self, Backend, RayQuery};
-use marmor::render::{self, Job};
-use marmor::scene::{Estimator, Orders, Scene, SceneFile, Spread};
+use marmor::scene::{Estimator, Orders, Scene, Spread};
 use marmor::tally::{Tally, WalkTally};
+use parts::cuboid;
+use rendering::{Within, agree, channels, load, load_beside, means_of, on};
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 use support::{Row, table, whole_table};
-
-fn load(text: &str) -> Scene {
-    Scene::load(&SceneFile::parse(text, Path::new("test.toml")).unwrap()).unwrap()
-}
 
 fn rays(scene: &Scene) -> Box<dyn RayQuery + '_> {
     query::build(Backend::preferred(), &scene.meshes()).unwrap()
@@ -27,38 +25,21 @@ fn rays(scene: &Scene) -> Box<dyn RayQuery + '_> {
 const PLAIN: VolumePathOptions = VolumePathOptions { orders: Orders::All, photons: 0, specular: true, seed: 1 };
 
 fn render(scene: &Scene, options: VolumePathOptions, passes: u32) -> (Image, Tally) {
-    let rays = rays(scene);
     let method = VolumePath::new(scene, options).unwrap();
-    let resolution = scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed: options.seed, passes: Some(passes), time: None, cancel: &cancel };
-    let outcome = render::run(&method, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    let (film, outcome) = on(Backend::preferred(), scene, &method, options.seed, 0..passes);
     assert_eq!(film.counts().non_finite, 0);
     (film.image(), outcome.tally)
 }
 
 /// Mean over the picture, and its standard error from independent renders.
 fn mean(scene: &Scene, options: VolumePathOptions, passes: u32, runs: u64) -> [(f64, f64); 3] {
-    let of = |seed| {
-        let image = render(scene, VolumePathOptions { seed, ..options }, passes).0;
-        std::array::from_fn(|c| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / image.pixels.len() as f64)
-    };
-    let values: Vec<[f64; 3]> = (1..=runs).map(of).collect();
-    std::array::from_fn(|c| {
-        let n = runs as f64;
-        let mean = values.iter().map(|v| v[c]).sum::<f64>() / n;
-        let variance = values.iter().map(|v| (v[c] - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        (mean, (variance / n).sqrt())
-    })
+    let of = |seed| channels(&render(scene, VolumePathOptions { seed, ..options }, passes).0);
+    means_of(&(1..=runs).map(of).collect::<Vec<_>>())
 }
 
 /// With ten runs and more the standard error itself is known to some 20 %: 8 of them stand for 6 of a known one.
 fn assert_same(a: (f64, f64), b: (f64, f64), what: &str) {
-    let error = a.1.hypot(b.1);
-    println!("{what}: {} +- {} against {} +- {}", a.0, a.1, b.0, b.1);
-    assert!(error < 0.03 * b.0.abs(), "{what}: too noisy to say anything: {a:?} {b:?}");
-    assert!((a.0 - b.0).abs() < 8.0 * error, "{what}: {a:?} against {b:?}");
+    agree(a, b, Within { errors: 8.0, noise: 0.03 }, what);
 }
 
 /// A ball of radius 1 at the origin, seen from z = 5; eight pixels a side, all of them on the ball.
@@ -92,34 +73,20 @@ fn a_white_medium_vanishes_in_a_white_furnace() {
     }
 }
 
-/// A box whose top is the plane z = 0, as deep as `depth` and `half` wide to each side, as an OBJ file.
-fn slab(folder: &Path, depth: f64, half: f64) {
-    let mut text = String::new();
-    for z in [0.0, -depth] {
-        for [x, y] in [[-half, -half], [half, -half], [half, half], [-half, half]] {
-            text += &format!("v {x} {y} {z}\n");
-        }
-    }
-    text += "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n";
-    std::fs::write(folder.join("slab.obj"), text).unwrap();
-}
-
-/// A medium in a slab and beams into it from above.
+/// A medium in a slab under the plane z = 0 and beams into it from above.
 struct Beam {
     scene: Scene,
 }
 
 impl Beam {
     fn new([sigma_s, sigma_a, g, eta]: [f64; 4], depth: f64, half: f64) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        slab(folder.path(), depth, half);
         let text = format!(
             "unit = \"mm\"\n[camera]\nposition = [0, 0, 5]\nlook_at = [0, 0, 0]\nfov = 15\nup = [0, 1, 0]\nresolution = [1, 1]\n\
              [[object]]\nmesh = \"slab.obj\"\nmaterial = \"m\"\n[material.m]\ntype = \"translucent\"\nsigma_s = {sigma_s}\n\
              sigma_a = {sigma_a}\ng = {g}\neta = {eta}\n"
         );
-        let file = SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap();
-        Self { scene: Scene::load(&file).unwrap() }
+        let slab = cuboid([-half, -half, -depth], [half, half, 0.0]);
+        Self { scene: load_beside("slab.obj", &slab, &text) }
     }
 
     /// What leaves of `paths` that enter at the origin straight down; x relative to there.
@@ -390,7 +357,6 @@ fn single_scattering_of_subsurface_is_that_of_the_paths() {
     for (name, medium, light) in [("lamp", FORWARD, LAMP), ("environment", MILK, WHITE)] {
         let render = |model: &str, single: bool, seed: u64| {
             let scene = load(&ball(&format!("{medium}\nmodel = \"{model}\""), light));
-            let rays = rays(&scene);
             let options = SubsurfaceOptions {
                 single,
                 cache_samples: 256,
@@ -401,11 +367,7 @@ fn single_scattering_of_subsurface_is_that_of_the_paths() {
                 ..Default::default()
             };
             let method = Subsurface::new(&scene, options).unwrap();
-            let mut film = Film::new(scene.camera.resolution, Window::full(scene.camera.resolution)).unwrap();
-            let cancel = AtomicBool::new(false);
-            let job = Job { seed, passes: Some(256), time: None, cancel: &cancel };
-            render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-            film.image().pixels
+            on(Backend::preferred(), &scene, &method, seed, 0..256).0.image().pixels
         };
         assert_eq!(render("standard", true, 1), render("standard", false, 1));
         // The same cache with and without: the difference is the first order alone.
@@ -417,12 +379,11 @@ fn single_scattering_of_subsurface_is_that_of_the_paths() {
                 })
             })
             .collect();
+        let found = means_of(&runs);
         let scene = load(&ball(medium, light));
         let once = VolumePathOptions { orders: Orders::Single, specular: false, ..PLAIN };
         for (c, expected) in mean(&scene, once, 256, 10).into_iter().enumerate() {
-            let mean = runs.iter().map(|r| r[c]).sum::<f64>() / 10.0;
-            let variance = runs.iter().map(|r| (r[c] - mean).powi(2)).sum::<f64>() / 9.0;
-            assert_same((mean, (variance / 10.0).sqrt()), expected, &format!("{name}, channel {c}: first order"));
+            assert_same(found[c], expected, &format!("{name}, channel {c}: first order"));
         }
     }
 }
@@ -447,13 +408,9 @@ fn all_stored_spheres() {
         let path = Path::new(&folder).join(format!("images/gt_sphere_{preset}_128_layers.exr"));
         let [truth, its] = ["sub", "sub_err"].map(|layer| Image::read_exr_layer(&path, Some(layer)).unwrap());
         let scene = stored_ball(preset);
-        let rays = rays(&scene);
         let options = VolumePathOptions { photons: 16384, specular: false, seed: 5, ..PLAIN };
         let method = VolumePath::new(&scene, options).unwrap();
-        let mut film = Film::new([128, 128], Window::full([128, 128])).unwrap();
-        let cancel = AtomicBool::new(false);
-        let job = Job { seed: 5, passes: Some(128), time: None, cancel: &cancel };
-        render::run(&method, View { scene: &scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+        let (film, _) = on(Backend::preferred(), &scene, &method, 5, 0..128);
         let (mean, variance) = (film.image(), marmor::film::variance(&film).unwrap());
         let mut z = Vec::new();
         for i in 0..mean.pixels.len() {

@@ -77,7 +77,7 @@ pub struct BeamChannel {
 
 /// A pair of points as the depth integral sees it. Lengths in scene units.
 #[derive(Clone, Copy)]
-struct Pair {
+struct BeamGeometry {
     r: f64,
     /// Distance of the exit from the line of the ray.
     rho: f64,
@@ -87,7 +87,7 @@ struct Pair {
     mu: f64,
 }
 
-impl Pair {
+impl BeamGeometry {
     fn new(x: DVec3, n_i: DVec3, w: DVec3) -> Self {
         Self { r: x.length(), rho: x.cross(w).length(), x_w: x.dot(w), mu: (-w.dot(n_i)).max(0.0) }
     }
@@ -97,7 +97,7 @@ impl Pair {
     }
 }
 
-/// A [`Pair`] in mean free paths of one channel.
+/// A [`BeamGeometry`] in mean free paths of one channel.
 struct Ray {
     /// x·w.
     near: f64,
@@ -155,7 +155,7 @@ impl BeamChannel {
     /// M [1/unit²] per entered flux, from x = x_o - x_i \[unit\], the outward normal of the entry and the refracted
     /// direction inside.
     pub fn exitance(&self, x: DVec3, n_i: DVec3, w: DVec3) -> f64 {
-        self.integral(&Pair::new(x, n_i, w), 0.0)
+        self.integral(&BeamGeometry::new(x, n_i, w), 0.0)
     }
 
     /// κ · dip · 4π · e^{s d_r}, lengths in mean free paths. With t = d_v - d_r and m = expm1(-s t):
@@ -183,7 +183,7 @@ impl BeamChannel {
     /// nearest poles are at Im v = π/2 whatever the scale of ρ: with 32 nodes a panel the error is below 1e-7 for r
     /// from 1e-4 to 1e4 mean free paths. One panel at normal incidence, two for most oblique rays, at most nine. E is
     /// convex; the range is where it lies within [`RANGE`] of its least value, the roots of a quadratic.
-    fn integral(&self, pair: &Pair, gain: f64) -> f64 {
+    fn integral(&self, pair: &BeamGeometry, gain: f64) -> f64 {
         if self.exitance_scale == 0.0 {
             return 0.0;
         }
@@ -276,7 +276,7 @@ impl BeamChannel {
                 let a = first + width * f64::from(i);
                 rule.integrate(a, a + width, |y| {
                     let r = unit * y.exp();
-                    2.0 * PI * r * r * self.integral(&Pair { r, rho: r, x_w: 0.0, mu: 1.0 }, 0.0)
+                    2.0 * PI * r * r * self.integral(&BeamGeometry { r, rho: r, x_w: 0.0, mu: 1.0 }, 0.0)
                 })
             })
             .sum()
@@ -284,7 +284,7 @@ impl BeamChannel {
 
     /// What depth `t` \[unit\] alone gives, over its own density σ_t′ exp(-σ_t′ t), times e^{gain}.
     #[inline]
-    fn at_depth(&self, pair: &Pair, t: f64, gain: f64) -> f64 {
+    fn at_depth(&self, pair: &BeamGeometry, t: f64, gain: f64) -> f64 {
         let length = self.sigma_t_prime;
         let (from_nearest, rho) = ((t - pair.x_w) * length, pair.rho * length);
         let z_r = t * pair.mu * length;
@@ -340,7 +340,7 @@ impl PhotonBeamDiffusion {
     /// Each channel is weighted by its own density over that of the mixture (the balance heuristic), at most 3. κ
     /// keeps the variance finite at small depths, the floor d_r ≥ z_r keeps each value finite.
     pub fn eval_at_depth(&self, entry: &Entry, t: f32, exit: &Exit, rate: f32) -> Rgb {
-        let pair = Pair::of(entry, exit);
+        let pair = BeamGeometry::of(entry, exit);
         let (t, gain) = (f64::from(t), f64::from(rate) * pair.r);
         if self.grey {
             return Rgb::splat(to_finite(self.channels[0].at_depth(&pair, t, gain)));
@@ -356,7 +356,7 @@ impl PhotonBeamDiffusion {
 impl Bssrdf for PhotonBeamDiffusion {
     /// The whole integral over depth, by quadrature: 32 dipoles a channel at normal incidence, more off the plane.
     fn eval_compensated(&self, entry: &Entry, exit: &Exit, rate: f32) -> Rgb {
-        let pair = Pair::of(entry, exit);
+        let pair = BeamGeometry::of(entry, exit);
         let gain = f64::from(rate) * pair.r;
         let value = |k: &BeamChannel| to_finite(k.radiance * k.integral(&pair, gain));
         if self.grey {

@@ -25,12 +25,12 @@ pub(super) static MODEL: ModelKind = ModelKind {
 /// The difference of the two g0 loses (r / z_v)² of its digits as printed; with t = d_v - d_r, formed without
 /// cancellation, it is exp(-s d_r) [t / d_r - expm1(-s t)] / d_v.
 pub struct BetterDipole {
-    channels: Channels<Pair>,
+    channels: Channels<BetterChannel>,
 }
 
 /// One channel, lengths in transport mean free paths.
 #[derive(Clone, Copy, Debug)]
-pub struct Pair {
+pub struct BetterChannel {
     /// σ_t′² [1/unit²].
     sigma_squared: f32,
     /// log2 e / σ_t′ [unit]: of a rate, what it takes off `decay_log2`.
@@ -62,7 +62,7 @@ impl BetterDipole {
             let z_virtual = 1.0 + 4.0 * moments.a_mixed() * diffusion;
             let s = (k.absorbed / diffusion).sqrt();
             decay = decay.min(s * k.sigma_t_prime);
-            Pair {
+            BetterChannel {
                 sigma_squared: finite(k.sigma_t_prime * k.sigma_t_prime),
                 length_log2: length_log2(&k),
                 decay: s as f32,
@@ -87,7 +87,7 @@ impl BetterDipole {
     }
 }
 
-impl Formula for Pair {
+impl Formula for BetterChannel {
     #[inline(always)]
     fn eval<const COMPENSATED: bool>(self, r2: f32, rate: f32) -> f32 {
         let s = self.decay;
@@ -109,18 +109,18 @@ impl Formula for Pair {
     }
 }
 
-columns!(Pair, Pairs { sigma_squared, length_log2, decay, decay_log2, z_virtual, lift, fluence, flux, scale });
+columns!(BetterChannel, Pairs { sigma_squared, length_log2, decay, decay_log2, z_virtual, lift, fluence, flux, scale });
 
-impl Channel for Pair {
+impl Channel for BetterChannel {
     type Columns = Pairs;
 }
 
 impl DistanceOnly for BetterDipole {
-    type Channel = Pair;
+    type Channel = BetterChannel;
     const NAME: ModelName = ModelName::BETTER;
     const CLAIMS: Claims = Claims { first_order: false, reciprocal: true, bounded_energy: true };
 
-    fn channels(&self) -> &Channels<Pair> {
+    fn channels(&self) -> &Channels<BetterChannel> {
         &self.channels
     }
 }

@@ -72,7 +72,7 @@ pub struct DirectionalChannel {
 
 /// The scalars by which a pair of points enters the kernel, shared by the channels. Lengths in scene units.
 #[derive(Clone, Copy)]
-pub(super) struct Pair {
+pub(super) struct DirectionalGeometry {
     r: f64,
     /// |x × w|.
     rho: f64,
@@ -86,7 +86,7 @@ pub(super) struct Pair {
     n_star: f64,
 }
 
-impl Pair {
+impl DirectionalGeometry {
     /// From x = x_o - x_i, the outward normal of the entry, the refracted direction and the outward normal of the
     /// exit. Normals need not be of unit length.
     #[inline(always)]
@@ -167,7 +167,7 @@ impl DirectionalChannel {
     /// S_d [1/(unit² sr)] before the clamp at 0, from x = x_o - x_i \[unit\], the outward normal of the entry, the
     /// refracted direction inside and the outward normal of the exit.
     pub fn unclamped(&self, x: DVec3, n_i: DVec3, w: DVec3, n_o: DVec3) -> f64 {
-        self.kernel(&Pair::new(x, n_i, w, n_o), 0.0)
+        self.kernel(&DirectionalGeometry::new(x, n_i, w, n_o), 0.0)
     }
 
     /// S_d e^{gain}, not clamped; `gain` is at most s r, so that the exponent is never above 0.
@@ -181,7 +181,7 @@ impl DirectionalChannel {
     ///   k_r/d_r³ - q k_v/d_v³     = [k_r (u (1 + v + v²) - m) - q s t] / d_v³,                 k = 1 + s d
     ///   j_r/d_r⁵ - q j_v/d_v⁵     = [j_r (u (1 + v + v² + v³ + v⁴) - m) - q (j_v - j_r)] / d_v⁵,  j = 3 k + (s d)²
     #[inline(always)]
-    pub(super) fn kernel(&self, pair: &Pair, gain: f64) -> f64 {
+    pub(super) fn kernel(&self, pair: &DirectionalGeometry, gain: f64) -> f64 {
         let (s, h, length) = (self.s, self.h, self.sigma_t_prime);
         let (r, rho, x_w, x_n) = (pair.r * length, pair.rho * length, pair.x_w * length, pair.x_n * length);
         let r2 = r * r;
@@ -232,7 +232,8 @@ impl DirectionalChannel {
                 let a = first + width * f64::from(i);
                 rule.integrate(a, a + width, |y| {
                     let r = unit * y.exp();
-                    let pair = Pair { r, rho: r, x_w: 0.0, x_n: 0.0, mu_0: 1.0, w_star: -1.0, n_star: 1.0 };
+                    let pair =
+                        DirectionalGeometry { r, rho: r, x_w: 0.0, x_n: 0.0, mu_0: 1.0, w_star: -1.0, n_star: 1.0 };
                     2.0 * PI * r * r * clamped(self.kernel(&pair, 0.0))
                 })
             })
@@ -275,7 +276,7 @@ impl DirectionalDipole {
 
     pub(super) fn each_channel(&self, entry: &Entry, exit: &Exit, rate: f32, finish: impl Fn(f64) -> f64) -> Rgb {
         let x = exit.x.as_dvec3() - entry.x.as_dvec3();
-        let pair = Pair::new(x, entry.n.as_dvec3(), entry.w.as_dvec3(), exit.n.as_dvec3());
+        let pair = DirectionalGeometry::new(x, entry.n.as_dvec3(), entry.w.as_dvec3(), exit.n.as_dvec3());
         let gain = f64::from(rate) * pair.r;
         let value = |k: &DirectionalChannel| to_finite(finish(k.kernel(&pair, gain)));
         if self.grey {

@@ -1,6 +1,6 @@
 //! The directional dipole as a model: its contract, and vectorised sums over many cached entries.
 
-use super::directional::{DirectionalChannel, DirectionalDipole, Pair, clamped};
+use super::directional::{DirectionalChannel, DirectionalDipole, DirectionalGeometry, clamped};
 use super::gather::{EntryColumns, LANES, block};
 use super::{Bssrdf, Claims, Entry, Exit, ModelName};
 use crate::math::{DVec3, Kernel, Level, Rgb, dispatch_at};
@@ -52,7 +52,7 @@ fn sum_at(channels: &[DirectionalChannel; 3], grey: bool, exit: &Exit, e: &Entry
             let apart = at - vector(&x);
             let part = e.partition.share(apart.length_squared() as f32);
             weight.iter_mut().for_each(|w| w[i] *= part);
-            let pair = Pair::new(apart, vector(&n), vector(&w), n_o).columns();
+            let pair = DirectionalGeometry::new(apart, vector(&n), vector(&w), n_o).columns();
             for (column, value) in pairs.iter_mut().zip(pair) {
                 column[i] = value;
             }
@@ -63,7 +63,8 @@ fn sum_at(channels: &[DirectionalChannel; 3], grey: bool, exit: &Exit, e: &Entry
             if c == 0 || !grey {
                 let channel = channels[c];
                 for (i, (s, negative)) in s.iter_mut().zip(&mut negative).enumerate() {
-                    let value = channel.kernel(&Pair::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
+                    let value =
+                        channel.kernel(&DirectionalGeometry::from_columns(std::array::from_fn(|k| pairs[k][i])), 0.0);
                     *s = clamped(value).min(f64::from(f32::MAX));
                     *negative = u64::from(value < 0.0);
                 }

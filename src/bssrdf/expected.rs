@@ -21,7 +21,7 @@ pub struct ExpectedError {
 
 /// What decides it: one channel of a medium, and the shape around a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct Conditions {
     /// Reduced albedo, 0 to 1.
     pub alpha_prime: f64,
     /// Mean cosine of the phase function.
@@ -35,7 +35,7 @@ pub struct Place {
     pub curvature: f64,
 }
 
-impl Place {
+impl Conditions {
     /// A place of thickness \[unit\] and mean curvature [1/unit] in one channel of a medium.
     pub fn new(optics: &ChannelOptics, eta: f64, thickness: f64, curvature: f64) -> Self {
         let path = optics.transport_mean_free_path;
@@ -111,7 +111,7 @@ pub enum Unmeasured {
 pub fn expected_error(
     model: ModelName,
     options: &ModelOptions,
-    place: &Place,
+    place: &Conditions,
 ) -> std::result::Result<ExpectedError, Unmeasured> {
     let head = model.evidence(options).ok_or(Unmeasured::Model)?;
     let column = table().models.iter().position(|m| *m == head).ok_or(Unmeasured::Model)?;
@@ -185,7 +185,7 @@ struct Table {
 }
 
 impl Shapes {
-    fn shape(&self, column: usize, place: &Place) -> Read {
+    fn shape(&self, column: usize, place: &Conditions) -> Read {
         if place.thickness.is_nan() {
             return Err(Unmeasured::Open);
         }
@@ -294,12 +294,12 @@ fn read(text: &'static str) -> Table {
 mod tests {
     use super::*;
 
-    fn place(alpha_prime: f64, thickness: f64, curvature: f64) -> Place {
-        Place { alpha_prime, g: 0.0, eta: 1.3, thickness, curvature }
+    fn place(alpha_prime: f64, thickness: f64, curvature: f64) -> Conditions {
+        Conditions { alpha_prime, g: 0.0, eta: 1.3, thickness, curvature }
     }
 
     /// By the head of the columns.
-    fn error_of(head: &str, place: &Place) -> std::result::Result<ExpectedError, Unmeasured> {
+    fn error_of(head: &str, place: &Conditions) -> std::result::Result<ExpectedError, Unmeasured> {
         let options = ModelOptions { calibrated: head == "calibrated", ..ModelOptions::DEFAULT };
         let is = |model: &&ModelName| model.evidence(&options) == Some(head);
         expected_error(*ModelName::ALL.iter().find(is).unwrap(), &options, place)
@@ -318,9 +318,9 @@ mod tests {
             ("1.3,0,slab,5,0.999,", place(0.999, 5.0, 0.0)),
             ("1.3,0,ball,2,0.7,", place(0.7, 4.0, 0.5)),
             ("1.3,0,ball,50,0.99,", place(0.99, 1000.0, 0.02)),
-            ("1.5,0,slab,10,0.97,", Place { eta: 1.5, ..place(0.97, 10.0, -3.0) }),
-            ("1,0,half,0,0.5,", Place { eta: 1.0, ..place(0.5, f64::INFINITY, f64::NAN) }),
-            ("1.3,0.8,ball,10,0.9,", Place { g: 0.8, ..place(0.9, 20.0, 0.1) }),
+            ("1.5,0,slab,10,0.97,", Conditions { eta: 1.5, ..place(0.97, 10.0, -3.0) }),
+            ("1,0,half,0,0.5,", Conditions { eta: 1.0, ..place(0.5, f64::INFINITY, f64::NAN) }),
+            ("1.3,0.8,ball,10,0.9,", Conditions { g: 0.8, ..place(0.9, 20.0, 0.1) }),
         ] {
             let cells = row(head);
             for (k, column) in table().models.iter().enumerate() {
@@ -336,6 +336,18 @@ mod tests {
                 let far = cells[2 * table().models.len() + k];
                 assert!(error.far.map_or(far.is_nan(), |e| close(e, far)), "{head} {error:?} {far}");
             }
+        }
+    }
+
+    /// A model that named the columns of another would tell that one's errors.
+    #[test]
+    fn columns_are_those_of_the_models_after_which_they_are_named() {
+        for head in &table().models {
+            let calibrated = *head == "calibrated";
+            let options = ModelOptions { calibrated, ..ModelOptions::DEFAULT };
+            let name = if calibrated { "directional" } else { head };
+            let model = ModelName::ALL.iter().find(|model| model.name() == name).unwrap();
+            assert_eq!(model.evidence(&options), Some(*head));
         }
     }
 
@@ -387,34 +399,34 @@ mod tests {
     #[test]
     fn what_has_not_been_measured_has_no_figure() {
         let sound = place(0.9, 10.0, 0.0);
-        let of = |model, place: Place| expected_error(model, &ModelOptions::DEFAULT, &place).err();
+        let of = |model, place: Conditions| expected_error(model, &ModelOptions::DEFAULT, &place).err();
         let beam = |place| of(ModelName::BEAM, place);
         assert_eq!(beam(sound), None);
         for alpha_prime in [0.0, 0.29, 0.99992, 1.0, f64::NAN] {
-            assert_eq!(beam(Place { alpha_prime, ..sound }), Some(Unmeasured::Albedo), "{alpha_prime}");
+            assert_eq!(beam(Conditions { alpha_prime, ..sound }), Some(Unmeasured::Albedo), "{alpha_prime}");
         }
         for eta in [0.67, 0.99, 1.51, f64::NAN] {
-            assert_eq!(beam(Place { eta, ..sound }), Some(Unmeasured::Index), "{eta}");
+            assert_eq!(beam(Conditions { eta, ..sound }), Some(Unmeasured::Index), "{eta}");
         }
         for g in [-0.999, -0.01, 0.81, f64::NAN] {
-            assert_eq!(beam(Place { g, ..sound }), Some(Unmeasured::Cosine), "{g}");
+            assert_eq!(beam(Conditions { g, ..sound }), Some(Unmeasured::Cosine), "{g}");
         }
         assert_eq!(
-            beam(Place { g: 0.4, alpha_prime: 0.4, ..sound }),
+            beam(Conditions { g: 0.4, alpha_prime: 0.4, ..sound }),
             Some(Unmeasured::Albedo),
             "g = 0.8 begins at 0.5"
         );
-        assert_eq!(beam(Place { thickness: f64::NAN, ..sound }), Some(Unmeasured::Open));
-        assert_eq!(beam(Place { thickness: 0.99, ..sound }), Some(Unmeasured::Thin));
+        assert_eq!(beam(Conditions { thickness: f64::NAN, ..sound }), Some(Unmeasured::Open));
+        assert_eq!(beam(Conditions { thickness: 0.99, ..sound }), Some(Unmeasured::Thin));
         assert_eq!(of(ModelName::AUTO, sound), Some(Unmeasured::Model));
-        assert_eq!(of(ModelName::SLAB, Place { thickness: 1.5, ..sound }), Some(Unmeasured::Model));
+        assert_eq!(of(ModelName::SLAB, Conditions { thickness: 1.5, ..sound }), Some(Unmeasured::Model));
         assert_eq!(of(ModelName::SLAB, sound), None);
         // The nearest end has.
         for place in [
-            Place { g: 0.4, alpha_prime: 0.1, ..sound },
-            Place { alpha_prime: 1.0, g: -0.9, ..sound },
-            Place { eta: 2.0, thickness: 0.01, curvature: 100.0, ..sound },
-            Place { eta: 0.7, g: 0.99, ..sound },
+            Conditions { g: 0.4, alpha_prime: 0.1, ..sound },
+            Conditions { alpha_prime: 1.0, g: -0.9, ..sound },
+            Conditions { eta: 2.0, thickness: 0.01, curvature: 100.0, ..sound },
+            Conditions { eta: 0.7, g: 0.99, ..sound },
         ] {
             let nearest = place.nearest_measured();
             assert!(beam(place).is_some() && beam(nearest).is_none(), "{place:?} {nearest:?}");
@@ -422,9 +434,10 @@ mod tests {
         }
         assert_eq!(sound.nearest_measured(), sound);
         // Single precision may not throw out the ends.
-        let ends = Place { eta: f64::from(1.5_f32), alpha_prime: f64::from(0.3_f32), g: f64::from(-0.0_f32), ..sound };
+        let ends =
+            Conditions { eta: f64::from(1.5_f32), alpha_prime: f64::from(0.3_f32), g: f64::from(-0.0_f32), ..sound };
         assert_eq!(beam(ends), None);
-        assert_eq!(beam(Place { alpha_prime: 1.0 - 0.999e-4, ..sound }), None);
+        assert_eq!(beam(Conditions { alpha_prime: 1.0 - 0.999e-4, ..sound }), None);
         assert_eq!((measured_albedos(0.0), measured_albedos(0.5)), ([0.3, 0.9999], [0.5, 0.9999]));
     }
 }

@@ -33,7 +33,7 @@ pub use better::BetterDipole;
 pub use channel::ChannelMedium;
 pub use depth::DepthLaw;
 pub use directional::{DirectionalChannel, DirectionalDipole};
-pub use expected::{ExpectedError, Place, Unmeasured, expected_error, measured_albedos};
+pub use expected::{Conditions, ExpectedError, Unmeasured, expected_error, measured_albedos};
 #[doc(hidden)]
 pub use gather::{EntryColumns, LEAST_COLUMNS, Layout, MOST_COLUMNS, Row};
 #[doc(hidden)]

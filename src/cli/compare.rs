@@ -6,7 +6,7 @@ use super::race::{Failures, RaceArgs, Reference, Runner, command, machine, race,
 use marmor::film::{Image, Metadata, PngOptions, Truth, Window, brightness, judge, png_bytes, save};
 use marmor::integrator::View;
 use marmor::math::Rgb;
-use marmor::render::{Seen, first_hit};
+use marmor::render::{Aov, first_hit};
 use marmor::report::{Compared, Figures, ModelComparison, Picture, PicturePart, common_range, false_colours};
 use marmor::scene::MethodName;
 use marmor::words::counted;
@@ -146,7 +146,7 @@ fn write(
 /// The share of each pixel where the camera meets a translucent object first.
 fn translucent_shares(runner: &Runner<'_>) -> Vec<f32> {
     let (scene, window) = (&runner.entrant.prepared.scene, Window::full(runner.film.resolution()));
-    let seen = first_hit(View { scene, rays: runner.rays() }, window, Seen::Translucent);
+    let seen = first_hit(View { scene, rays: runner.rays() }, window, Aov::Translucent);
     seen.pixels.iter().map(|p| p[0]).collect()
 }
 

@@ -44,12 +44,12 @@ impl Files {
     /// # Errors
     /// Usage, with both and with what to do.
     pub fn check(&self) -> Result<()> {
-        let mut taken: HashMap<Place, (&str, &Path, bool)> = HashMap::new();
+        let mut taken: HashMap<FileId, (&str, &Path, bool)> = HashMap::new();
         for (what, path) in &self.read {
-            taken.entry(Place::of(path)).or_insert((what, path, true));
+            taken.entry(FileId::of(path)).or_insert((what, path, true));
         }
         for (what, path, remedy) in &self.written {
-            let Some((other, at, is_input)) = taken.insert(Place::of(path), (what, path, false)) else { continue };
+            let Some((other, at, is_input)) = taken.insert(FileId::of(path), (what, path, false)) else { continue };
             let same = if at == path { String::new() } else { format!(" ({})", at.display()) };
             let would = if is_input { "would be written over" } else { "would be the same file as" };
             let remedy = match remedy {
@@ -88,7 +88,7 @@ pub fn free_name(path: &Path, taken: impl Fn(&Path) -> bool) -> PathBuf {
 
 /// A file, whatever it is called.
 #[derive(PartialEq, Eq, Hash)]
-enum Place {
+enum FileId {
     /// What is there: links of both kinds, other spellings and other cases lead to it.
     There(Identity),
     /// What is not there yet: its folder, and its name without regard to case, which many systems have none for.
@@ -100,7 +100,7 @@ type Identity = (u64, u64);
 #[cfg(not(unix))]
 type Identity = PathBuf;
 
-impl Place {
+impl FileId {
     fn of(path: &Path) -> Self {
         let mut path = path.to_path_buf();
         // A link to what is not there yet ends where it points; a ring of links has no end.

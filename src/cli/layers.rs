@@ -3,7 +3,7 @@
 use super::setup::{Method, Prepared};
 use marmor::film::{Film, Image, Layer, variance};
 use marmor::integrator::{FirstOrder, View};
-use marmor::render::{self, Job, Seen, first_hit};
+use marmor::render::{self, Aov, Job, first_hit};
 use marmor::{Error, Result};
 use std::sync::Mutex;
 use std::sync::atomic::AtomicBool;
@@ -18,9 +18,9 @@ pub enum LayerName {
     /// Shading normal there, towards the camera
     #[value(name = "N")]
     Normal,
-    /// Its place in the scene's coordinates
+    /// Its position in the scene's coordinates
     #[value(name = "P")]
-    Place,
+    Position,
     /// Its distance along the direction of view
     #[value(name = "Z")]
     Depth,
@@ -36,7 +36,7 @@ impl LayerName {
             Self::Variance => "variance",
             Self::Albedo => "albedo",
             Self::Normal => "N",
-            Self::Place => "P",
+            Self::Position => "P",
             Self::Depth => "Z",
             Self::Single => "single",
             Self::Validity => "validity",
@@ -48,19 +48,19 @@ impl LayerName {
         match self {
             Self::Variance => ("Variance", &["R", "G", "B"]),
             Self::Albedo | Self::Single => (self.name(), &["R", "G", "B"]),
-            Self::Normal | Self::Place => (self.name(), &["X", "Y", "Z"]),
+            Self::Normal | Self::Position => (self.name(), &["X", "Y", "Z"]),
             Self::Depth => ("", &["Z"]),
             Self::Validity => (self.name(), &["Y", "thickness", "curvature"]),
         }
     }
 
-    fn seen(self) -> Option<Seen> {
+    fn aov(self) -> Option<Aov> {
         match self {
-            Self::Albedo => Some(Seen::Albedo),
-            Self::Normal => Some(Seen::Normal),
-            Self::Place => Some(Seen::Place),
-            Self::Depth => Some(Seen::Depth),
-            Self::Validity => Some(Seen::Validity),
+            Self::Albedo => Some(Aov::Albedo),
+            Self::Normal => Some(Aov::Normal),
+            Self::Position => Some(Aov::Position),
+            Self::Depth => Some(Aov::Depth),
+            Self::Validity => Some(Aov::Validity),
             Self::Variance | Self::Single => None,
         }
     }
@@ -146,7 +146,7 @@ impl<'a> Layers<'a> {
     }
 
     fn image(&self, name: LayerName, film: &Film) -> Result<Option<Image>> {
-        match (name, name.seen(), &self.scene) {
+        match (name, name.aov(), &self.scene) {
             (_, Some(what), Some((_, view))) => Ok(Some(self.once(name, || first_hit(*view, film.window(), what)))),
             (LayerName::Single, _, Some((prepared, view))) => single(prepared, *view, film).map(Some),
             _ => Ok(variance(film)),

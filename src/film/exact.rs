@@ -15,7 +15,7 @@ pub(super) const PLACES: u8 = 17;
 /// unit of the lower place: 2^-37 of the largest number added, in the worst case, and nothing at all for numbers down
 /// to 2^-12 of it, whose 24 bits all lie in the two places.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Exact {
+pub(super) struct ExactSum {
     pub top: u8,
     pub digits: [i64; 2],
 }
@@ -29,7 +29,7 @@ fn parts(value: f32) -> (i64, u32) {
     (if bits >> 31 == 0 { whole } else { -whole }, place)
 }
 
-impl Exact {
+impl ExactSum {
     /// Adds a finite number.
     #[inline]
     pub fn add(&mut self, value: f32) {
@@ -140,14 +140,14 @@ mod tests {
     use crate::math::{hash, hash_combine};
     use proptest::prelude::*;
 
-    fn of(values: &[f32]) -> Exact {
-        let mut sum = Exact::default();
+    fn of(values: &[f32]) -> ExactSum {
+        let mut sum = ExactSum::default();
         values.iter().for_each(|&v| sum.add(v));
         sum
     }
 
-    fn squares(values: &[f32]) -> Exact {
-        let mut sum = Exact::default();
+    fn squares(values: &[f32]) -> ExactSum {
+        let mut sum = ExactSum::default();
         values.iter().for_each(|&v| sum.add_square(v));
         sum
     }

@@ -1,6 +1,6 @@
 //! The film: what the samples of each pixel add up to.
 
-use super::exact::{Exact, MOST, PLACES};
+use super::exact::{ExactSum, MOST, PLACES};
 use super::{Image, Window};
 use crate::math::Rgb;
 use crate::{Error, ErrorKind, Result, memory};
@@ -25,12 +25,12 @@ const SQUARES: usize = 6;
 
 impl Sums {
     #[inline]
-    fn get(&self, k: usize) -> Exact {
-        Exact { top: self.tops[k], digits: self.digits[k] }
+    fn get(&self, k: usize) -> ExactSum {
+        ExactSum { top: self.tops[k], digits: self.digits[k] }
     }
 
     #[inline]
-    fn set(&mut self, k: usize, sum: Exact) {
+    fn set(&mut self, k: usize, sum: ExactSum) {
         (self.tops[k], self.digits[k]) = (sum.top, sum.digits);
     }
 

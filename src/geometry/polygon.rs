@@ -227,20 +227,13 @@ mod tests {
     }
 
     /// A square with a square hole, reached and left by one repeated edge, as exporters write it.
+    fn framed([a, b, c, d]: [[f64; 2]; 4]) -> Vec<[f64; 3]> {
+        flat(&[[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 0.0], a, b, c, d, a])
+    }
+
     #[test]
     fn a_hole_bridged_by_a_repeated_edge_stays_open() {
-        let keyhole = flat(&[
-            [0.0, 0.0],
-            [4.0, 0.0],
-            [4.0, 4.0],
-            [0.0, 4.0],
-            [0.0, 0.0],
-            [1.0, 1.0],
-            [1.0, 3.0],
-            [3.0, 3.0],
-            [3.0, 1.0],
-            [1.0, 1.0],
-        ]);
+        let keyhole = framed([[1.0, 1.0], [1.0, 3.0], [3.0, 3.0], [3.0, 1.0]]);
         for corners in [keyhole.clone(), leaning(&keyhole)] {
             let (triangles, area, odd) = cut(&corners);
             assert!((area - 12.0).abs() < 1e-9 && triangles.len() == 8 && !odd.crosses, "{area} {triangles:?} {odd:?}");
@@ -317,18 +310,7 @@ mod tests {
         let twice = flat(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
         assert!(cut(&twice).2.crosses);
         // A hole that runs the way of its border.
-        let wrong = flat(&[
-            [0.0, 0.0],
-            [4.0, 0.0],
-            [4.0, 4.0],
-            [0.0, 4.0],
-            [0.0, 0.0],
-            [1.0, 1.0],
-            [3.0, 1.0],
-            [3.0, 3.0],
-            [1.0, 3.0],
-            [1.0, 1.0],
-        ]);
+        let wrong = framed([[1.0, 1.0], [3.0, 1.0], [3.0, 3.0], [1.0, 3.0]]);
         assert!(cut(&wrong).2.crosses);
     }
 

@@ -1,7 +1,7 @@
 //! The shape of a body around a place, and how far models can be trusted there.
 
 use super::View;
-use crate::bssrdf::{ExpectedError, ModelName, ModelOption, ModelOptions, Place, Unmeasured, expected_error};
+use crate::bssrdf::{Conditions, ExpectedError, ModelName, ModelOption, ModelOptions, Unmeasured, expected_error};
 use crate::geometry::SurfacePoint;
 use crate::math::{Vec3, frame};
 use crate::optics::{ChannelOptics, Medium};
@@ -140,21 +140,21 @@ impl LocalShape {
     }
 
     /// The places of `local` in the channels that have a medium.
-    fn places(&self, local: Local) -> impl Iterator<Item = Place> + '_ {
+    fn places(&self, local: Local) -> impl Iterator<Item = Conditions> + '_ {
         let some = self.optics.iter().filter(|k| k.transport_mean_free_path.is_finite());
-        some.map(move |k| Place::new(k, self.medium.eta.into(), local.thickness.into(), local.curvature.into()))
+        some.map(move |k| Conditions::new(k, self.medium.eta.into(), local.thickness.into(), local.curvature.into()))
     }
 
     /// The largest error of the three channels that `candidate` is expected to make at `local`, and where.
     ///
     /// # Errors
     /// One of the channels has not been measured.
-    pub fn expected(&self, candidate: Candidate, local: Local) -> Result<(ExpectedError, Place), Unmeasured> {
+    pub fn expected(&self, candidate: Candidate, local: Local) -> Result<(ExpectedError, Conditions), Unmeasured> {
         let apart = |t: f32| (local.thickness - t).abs() > SAME_THICKNESS * t;
         if candidate.thickness.is_some_and(apart) {
             return Err(Unmeasured::Model);
         }
-        let mut worst: Option<(ExpectedError, Place)> = None;
+        let mut worst: Option<(ExpectedError, Conditions)> = None;
         for place in self.places(local) {
             let error = expected_error(candidate.model, &candidate.options(), &place)?;
             if worst.is_none_or(|(e, _)| error.distribution > e.distribution) {

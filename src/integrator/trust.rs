@@ -2,7 +2,7 @@
 
 use super::View;
 use super::local::{Candidate, Local, LocalShape};
-use crate::bssrdf::{ExpectedError, ModelName, ModelOption, Place, Unmeasured, expected_error};
+use crate::bssrdf::{Conditions, ExpectedError, ModelName, ModelOption, Unmeasured, expected_error};
 use crate::geometry::Mesh;
 use crate::optics::FresnelMoments;
 use crate::scene::{ObstacleKind, Translucent};
@@ -266,7 +266,7 @@ fn trusted_from(shape: &LocalShape, candidate: Candidate, tolerance: f64, path: 
     let wrong = |paths: f64| {
         let some = shape.optics().iter().filter(|k| k.transport_mean_free_path.is_finite());
         some.map(|k| {
-            let place = Place::new(k, shape.eta(), paths * path, 0.0);
+            let place = Conditions::new(k, shape.eta(), paths * path, 0.0);
             expected_error(candidate.model, &candidate.options(), &place).map_or(f64::INFINITY, |e| e.distribution)
         })
         .fold(0.0, f64::max)

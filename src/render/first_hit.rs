@@ -13,16 +13,16 @@ use rayon::prelude::*;
 /// Rays to each side of a square over a pixel.
 const SIDE: u32 = 4;
 
-/// What there is to see.
+/// An arbitrary output variable (AOV): a property of the surface that the camera sees first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Seen {
+pub enum Aov {
     /// Reflectance of diffuse surfaces, of translucent ones that of a half space of their medium; 0 for lights and
     /// background. Mean over the pixel.
     Albedo,
     /// Shading normal, turned towards the camera. Mean over the pixel, so shorter than 1 along edges; 0 without a surface.
     Normal,
-    /// Place in the scene file's coordinates \[unit\], through the pixel's middle; 0 without a surface.
-    Place,
+    /// Position in the scene file's coordinates \[unit\], through the pixel's middle; 0 without a surface.
+    Position,
     /// Distance along the direction of view \[unit\] in all channels, through the pixel's middle; infinite without a surface.
     Depth,
     /// Expected error of the material's model, 0.05 for 5 %, NaN where it has not been measured; thickness in transport mean
@@ -34,41 +34,41 @@ pub enum Seen {
 }
 
 /// A picture of `what` for the pixels of `window`.
-pub fn first_hit(view: View<'_>, window: Window, what: Seen) -> Image {
-    let shapes = if what == Seen::Validity { shapes(view.scene) } else { Vec::new() };
-    let albedo = if what == Seen::Albedo { albedos(view.scene) } else { Vec::new() };
+pub fn first_hit(view: View<'_>, window: Window, what: Aov) -> Image {
+    let shapes = if what == Aov::Validity { shapes(view.scene) } else { Vec::new() };
+    let albedo = if what == Aov::Albedo { albedos(view.scene) } else { Vec::new() };
     let camera = &view.scene.camera;
     let look = |pixel: [u32; 2], offset: [f32; 2]| -> Option<Rgb> {
         let ray = camera.ray(pixel, offset);
         let hit = view.rays.closest(&ray)?;
         let mesh = &view.scene.objects[hit.mesh as usize].mesh;
         match what {
-            Seen::Albedo => Some(albedo[hit.mesh as usize]),
-            Seen::Normal => {
+            Aov::Albedo => Some(albedo[hit.mesh as usize]),
+            Aov::Normal => {
                 let at = mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.direction);
                 Some(Rgb(at.normal_seen_from(-ray.direction).to_array()))
             }
-            Seen::Place => {
+            Aov::Position => {
                 let x = mesh.point(hit.triangle, hit.u, hit.v).x + view.scene.centre;
                 Some(Rgb(x.as_vec3().to_array()))
             }
-            Seen::Depth => Some(Rgb::splat((ray.direction * hit.t).dot(camera.forward()))),
-            Seen::Translucent => {
+            Aov::Depth => Some(Rgb::splat((ray.direction * hit.t).dot(camera.forward()))),
+            Aov::Translucent => {
                 let object = &view.scene.objects[hit.mesh as usize];
                 let translucent = view.scene.materials[object.material].surface.is_translucent();
                 translucent.then(|| Rgb::splat(1.0))
             }
-            Seen::Validity => Some(validity(view, shapes[hit.mesh as usize].as_ref()?, &hit)),
+            Aov::Validity => Some(validity(view, shapes[hit.mesh as usize].as_ref()?, &hit)),
         }
     };
     let pixel = |pixel: [u32; 2]| {
-        if matches!(what, Seen::Place | Seen::Depth) {
-            let nothing = if what == Seen::Depth { f32::INFINITY } else { 0.0 };
+        if matches!(what, Aov::Position | Aov::Depth) {
+            let nothing = if what == Aov::Depth { f32::INFINITY } else { 0.0 };
             return look(pixel, [0.5, 0.5]).unwrap_or(Rgb::splat(nothing));
         }
         let place = |k: u32| (k as f32 + 0.5) / SIDE as f32;
         let looks = (0..SIDE * SIDE).filter_map(|k| look(pixel, [place(k % SIDE), place(k / SIDE)]));
-        if what == Seen::Validity {
+        if what == Aov::Validity {
             return mean_of_numbers(looks);
         }
         looks.fold(Rgb::BLACK, |sum, value| sum + value) * (1.0 / (SIDE * SIDE) as f32)

@@ -19,7 +19,7 @@ pub use passes::Seconds;
 // For the program and the tests.
 #[doc(hidden)]
 pub use self::{
-    first_hit::{Seen, first_hit},
+    first_hit::{Aov, first_hit},
     framing::{Aim, nothing_in_view, shares},
     front::{Prepared, no_light, odd_counts},
     method::Method,

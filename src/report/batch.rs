@@ -1,6 +1,6 @@
 //! Rows of a CSV in, the same rows with S_d out: the models' rendering code for scripts and tests.
 
-use super::batch_model::{BatchOptions, Inputs, Place, Prepared, Substance};
+use super::batch_model::{BatchOptions, EntryExit, Inputs, ScaledModel, Substance};
 use crate::bssrdf::{ModelName, ModelOption};
 use crate::error::did_you_mean;
 use crate::{Error, Result};
@@ -13,14 +13,14 @@ const KEPT_MODELS: usize = 1024;
 /// Evaluates rows under one header.
 pub struct Batch {
     options: BatchOptions,
-    columns: Columns,
-    models: HashMap<[u64; 6], Prepared>,
+    columns: InputColumns,
+    models: HashMap<[u64; 6], ScaledModel>,
     last: [u64; 6],
     fields: Vec<(usize, usize)>,
 }
 
 /// Where the inputs stand in a row.
-struct Columns {
+struct InputColumns {
     substance: SubstanceColumns,
     /// Absent only beside `A` and `l`, where it is 1.
     eta: Option<usize>,
@@ -55,7 +55,7 @@ impl Batch {
         let mut fields = Vec::new();
         split(header, &mut fields);
         let names: Vec<&str> = fields.iter().map(|&(a, b)| field(header, a, b)).collect();
-        let columns = Columns::new(&names, options.model)?;
+        let columns = InputColumns::new(&names, options.model)?;
         if options.single && matches!(columns.substance, SubstanceColumns::Profile(_)) {
             return Err(Error::usage("single scattering needs sigma_s, sigma_a and g, not `A` and `l`"));
         }
@@ -106,14 +106,14 @@ impl Batch {
         };
         let place = match &columns.place {
             PlaceColumns::Plane(r) => {
-                Place::plane(number(*r, "r")?, medium.thickness.filter(|_| self.options.transmitted))?
+                EntryExit::plane(number(*r, "r")?, medium.thickness.filter(|_| self.options.transmitted))?
             }
             PlaceColumns::General(at) => {
                 let mut v = [0.0; 12];
                 for ((value, &column), name) in v.iter_mut().zip(at).zip(GENERAL) {
                     *value = number(column, name)?;
                 }
-                Place::general(&v)?
+                EntryExit::general(&v)?
             }
         };
         let exitance_too = matches!(columns.place, PlaceColumns::Plane(_));
@@ -142,7 +142,7 @@ impl Batch {
     }
 }
 
-impl Columns {
+impl InputColumns {
     fn new(names: &[&str], model: ModelName) -> Result<Self> {
         let at = |name: &str| names.iter().position(|n| *n == name);
         let mut missing: Vec<String> = Vec::new();

@@ -72,7 +72,7 @@ impl Inputs {
     }
 
     /// The model of the row.
-    pub fn prepare(&self, options: BatchOptions) -> Result<Prepared> {
+    pub fn prepare(&self, options: BatchOptions) -> Result<ScaledModel> {
         if let Some(thickness) = self.thickness.filter(|t| *t <= 0.0) {
             return Err(Error::scene(format!("thickness = {thickness} is not positive")));
         }
@@ -94,7 +94,7 @@ impl Inputs {
         let normalised = model.name().normalises_exit(options.made.exit_normalisation);
         let eta = if options.transmitted { self.eta_far.unwrap_or(self.eta) } else { self.eta };
         let exit = if normalised { FresnelMoments::new(eta).four_c_phi_outside } else { 1.0 };
-        Ok(Prepared { model, length, exit_factor: std::f64::consts::PI * exit, single })
+        Ok(ScaledModel { model, length, exit_factor: std::f64::consts::PI * exit, single })
     }
 
     /// The model and its unit of length.
@@ -121,7 +121,7 @@ impl Inputs {
 }
 
 /// A model in a unit of length near its transport mean free path, so that no input leaves the range of f32.
-pub(super) struct Prepared {
+pub(super) struct ScaledModel {
     model: Box<dyn Bssrdf>,
     /// That unit: a power of two, which moves no digit of the input.
     length: f64,
@@ -132,14 +132,14 @@ pub(super) struct Prepared {
 }
 
 /// Entry and exit of a row, in the row's unit.
-pub(super) struct Place {
+pub(super) struct EntryExit {
     x: [f64; 3],
     n_i: Vec3,
     n_o: Vec3,
     w: Vec3,
 }
 
-impl Place {
+impl EntryExit {
     /// On the lit plane, or on the far face of a slab as thick as `through`.
     pub fn plane(r: f64, through: Option<f64>) -> Result<Self> {
         if r < 0.0 {
@@ -163,9 +163,9 @@ impl Place {
     }
 }
 
-impl Prepared {
+impl ScaledModel {
     /// S_d [1/(unit² sr)] in the row's unit; `clamped` as rendering has it, else as the formula does.
-    pub fn s_d(&self, place: &Place, clamped: bool) -> f64 {
+    pub fn s_d(&self, place: &EntryExit, clamped: bool) -> f64 {
         let x = Vec3::from(place.x.map(|c| (c / self.length) as f32));
         let entry = Entry { x: Vec3::ZERO, n: place.n_i, w: place.w };
         let exit = Exit { x, n: place.n_o, w: place.n_o };
@@ -174,7 +174,7 @@ impl Prepared {
     }
 
     /// Exitance by single scattering on the plane through the entry [1/unit²].
-    pub fn single(&self, place: &Place) -> f64 {
+    pub fn single(&self, place: &EntryExit) -> f64 {
         let Some(single) = &self.single else { return 0.0 };
         let x = DVec3::from(place.x) / self.length;
         single.exitance(x, place.n_i.as_dvec3(), place.w.as_dvec3()) / (self.length * self.length)

@@ -1,6 +1,6 @@
 //! Where two scenes differ, in the words of whoever typed one of them.
 
-use super::tree::{Node, Place, Value};
+use super::tree::{Node, Origin, Value};
 use std::collections::{HashMap, HashSet};
 
 /// The first value that two scenes do not share.
@@ -8,7 +8,7 @@ pub(super) struct Difference<'a> {
     /// Dotted, as options take it: `camera.fov`, `object.0.radius`.
     key: String,
     /// Where the value was typed in the first scene, or the table that lacks it.
-    pub place: &'a Place,
+    pub place: &'a Origin,
     values: [Option<String>; 2],
 }
 
@@ -34,7 +34,7 @@ pub fn difference(a: &str, b: &str, [of_a, of_b]: [&str; 2]) -> Option<String> {
 
 fn between<'a>(key: String, here: &'a Node, there: &Node) -> Option<Difference<'a>> {
     let inside = |name: &str| if key.is_empty() { name.to_string() } else { format!("{key}.{name}") };
-    let differ = |key: String, place: &'a Place, values: [Option<&Node>; 2]| {
+    let differ = |key: String, place: &'a Origin, values: [Option<&Node>; 2]| {
         Some(Difference { key, place, values: values.map(|node| node.map(Node::shown)) })
     };
     let only_here = |key: String, node: &'a Node| {

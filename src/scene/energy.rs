@@ -2,7 +2,7 @@
 //! render, with the factor and a remedy.
 
 use super::{Object, Translucent};
-use crate::bssrdf::{Bssrdf, ModelName, ModelOption, Place, SingleScattering, expected_error};
+use crate::bssrdf::{Bssrdf, Conditions, ModelName, ModelOption, SingleScattering, expected_error};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, Medium};
 use crate::words::{digits, percent, short};
@@ -89,13 +89,13 @@ fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Un
     }
     let (eta, optics) = (f64::from(t.medium.eta), ChannelOptics::of(&t.medium));
     let scatters = |k: &ChannelOptics| k.alpha_prime > 0.0;
-    let place = |k: &ChannelOptics| Place::new(k, eta, shape.thickness, shape.curvature);
+    let place = |k: &ChannelOptics| Conditions::new(k, eta, shape.thickness, shape.curvature);
     // Beyond the table its nearest end.
     let error =
-        |place: Place| expected_error(model.name(), &t.options(), &place.nearest_measured()).unwrap_or_default();
+        |place: Conditions| expected_error(model.name(), &t.options(), &place.nearest_measured()).unwrap_or_default();
     let here = |k: &ChannelOptics| error(place(k));
     let factor = |k: &ChannelOptics| 1.0 + here(k).total;
-    let plane = |k: &ChannelOptics| 1.0 + error(Place::new(k, eta, f64::INFINITY, 0.0)).total;
+    let plane = |k: &ChannelOptics| 1.0 + error(Conditions::new(k, eta, f64::INFINITY, 0.0)).total;
     let each = || optics.iter().enumerate().filter(|(_, k)| scatters(k));
     let thickness = shape.thickness;
     let path = each().map(|(_, k)| k.transport_mean_free_path).fold(0.0, f64::max);
@@ -139,7 +139,7 @@ fn by_nature(t: &Translucent, model: &dyn Bssrdf, untraceable: &Untraceable<'_>)
     let (channel, factor) = largest(&t.medium, (0..3).map(|c| (c, f64::from(total[c]))))?;
     // What no table knows is held to what the model says of itself.
     let optics = ChannelOptics::of(&t.medium);
-    let plane = |k: &ChannelOptics| Place::new(k, t.medium.eta.into(), f64::INFINITY, 0.0);
+    let plane = |k: &ChannelOptics| Conditions::new(k, t.medium.eta.into(), f64::INFINITY, 0.0);
     let measured = optics.iter().all(|k| expected_error(model.name(), &t.options(), &plane(k)).is_ok());
     let excess = if measured { EXCESS } else { UNMEASURED_EXCESS };
     (factor > 1.0 + excess).then(|| {

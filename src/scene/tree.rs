@@ -9,7 +9,7 @@ use crate::error::{Error, Result, did_you_mean};
 #[derive(Clone, Debug)]
 pub(super) struct Node {
     pub value: Value,
-    pub place: Place,
+    pub place: Origin,
 }
 
 /// What TOML can hold; tables keep the order of the file.
@@ -27,14 +27,14 @@ pub(super) enum Value {
 
 /// Where a value was typed.
 #[derive(Clone, Debug)]
-pub(super) enum Place {
+pub(super) enum Origin {
     /// A line of the scene file, from 1.
     Line(usize),
     /// An option `-D path=value`, as typed.
     Override(String),
 }
 
-impl Place {
+impl Origin {
     /// The start of a message: `scenes/x.toml:7` or `-D a.b=c`.
     pub(super) fn within(&self, file: &Path) -> String {
         match self {
@@ -53,14 +53,14 @@ impl Node {
             let at = e.span().map_or(String::new(), |span| format!(":{}", line(span.start)));
             Error::scene(format!("{}{at}: not TOML: {}", file.display(), e.message()))
         })?;
-        Ok(Self { value: from_table(table.get_ref(), &|offset| Place::Line(line(offset))), place: Place::Line(1) })
+        Ok(Self { value: from_table(table.get_ref(), &|offset| Origin::Line(line(offset))), place: Origin::Line(1) })
     }
 
     /// Puts the value of `path.to.key=value` in its place. The value is read as TOML, and as text if it is none.
     pub(super) fn set(&mut self, typed: &str) -> Result<()> {
         let usage = |what: &str| Error::usage(format!("-D {typed}: {what}"));
         let (path, text) = typed.split_once('=').ok_or_else(|| usage("expected path.to.key=value"))?;
-        let place = Place::Override(typed.to_string());
+        let place = Origin::Override(typed.to_string());
         let keys: Vec<&str> = path.trim().split('.').map(str::trim).collect();
         if keys.contains(&"") {
             return Err(usage("expected path.to.key=value"));
@@ -155,7 +155,7 @@ impl Value {
     }
 }
 
-fn override_value(text: &str, place: &Place) -> Value {
+fn override_value(text: &str, place: &Origin) -> Value {
     let line = format!("x = {text}");
     if let Ok(table) = toml::de::DeTable::parse(&line)
         && table.get_ref().len() == 1
@@ -166,7 +166,7 @@ fn override_value(text: &str, place: &Place) -> Value {
     Value::Text(text.to_string())
 }
 
-fn from_table(table: &toml::de::DeTable<'_>, place: &dyn Fn(usize) -> Place) -> Value {
+fn from_table(table: &toml::de::DeTable<'_>, place: &dyn Fn(usize) -> Origin) -> Value {
     let mut entries: Vec<_> = table
         .iter()
         .map(|(key, value)| {
@@ -179,7 +179,7 @@ fn from_table(table: &toml::de::DeTable<'_>, place: &dyn Fn(usize) -> Place) -> 
     Value::Table(entries.into_iter().map(|(_, key, node)| (key, node)).collect())
 }
 
-fn from_value(value: &toml::de::DeValue<'_>, place: &dyn Fn(usize) -> Place) -> Value {
+fn from_value(value: &toml::de::DeValue<'_>, place: &dyn Fn(usize) -> Origin) -> Value {
     use toml::de::DeValue as V;
     match value {
         V::String(text) => Value::Text(text.to_string()),
@@ -220,7 +220,7 @@ pub(super) struct Fields<'a> {
     /// Dotted path, empty for the file itself.
     path: String,
     entries: &'a [(String, Node)],
-    place: &'a Place,
+    place: &'a Origin,
 }
 
 impl<'a> Fields<'a> {

@@ -3,6 +3,7 @@
 //! absorption.
 
 use super::harness::{BALL, backends, render};
+use super::rendering::{channels, means_of};
 use marmor::bssrdf::{ModelName, ModelOption, Radial, SingleScattering};
 use marmor::integrator::{Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, GaussLegendre, Rgb, Vec3};
@@ -31,15 +32,6 @@ pub fn translucent(scene: &Scene) -> &Translucent {
 /// A mean per channel and its standard error.
 pub type Mean = [(f64, f64); 3];
 
-/// Mean and standard error of numbers of independent runs.
-pub fn mean_of(runs: &[[f64; 3]]) -> Mean {
-    std::array::from_fn(|c| {
-        let n = runs.len() as f64;
-        let mean = runs.iter().map(|r| r[c]).sum::<f64>() / n;
-        (mean, (runs.iter().map(|r| (r[c] - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
-    })
-}
-
 /// With eight runs the standard error itself is known to some 25 %: 8 of them stand for 5 and more of a known one.
 pub const RUNS: u64 = 8;
 pub const ERRORS: f64 = 8.0;
@@ -51,11 +43,8 @@ pub fn seen<I: marmor::integrator::Integrator>(
     passes: u32,
     of: impl Fn(u64) -> I,
 ) -> Mean {
-    let run = |seed| {
-        let image = render(&of(seed), scene, backend, seed, passes).0.image();
-        std::array::from_fn(|c| image.pixels.iter().map(|p| f64::from(p[c])).sum::<f64>() / image.pixels.len() as f64)
-    };
-    mean_of(&(1..=RUNS).map(run).collect::<Vec<_>>())
+    let run = |seed| channels(&render(&of(seed), scene, backend, seed, passes).0.image());
+    means_of(&(1..=RUNS).map(run).collect::<Vec<_>>())
 }
 
 pub fn options(estimator: Estimator, single: bool) -> SubsurfaceOptions {

@@ -1,19 +1,17 @@
 //! One small scene, changed in one place by each case, and what its pictures must be.
 
 pub use super::rendering::backends;
-use super::rendering::options;
+use super::rendering::{on, options};
 use marmor::ErrorKind;
 use marmor::bssrdf::ModelName;
-use marmor::film::{Counts, Film, Image, Window};
+use marmor::film::{Counts, Film, Image};
 use marmor::integrator::{
-    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
+    AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions,
 };
-use marmor::query::{self, Backend};
-use marmor::render::{Job, run};
+use marmor::query::Backend;
 use marmor::scene::{Estimator, Orders, Scene, SceneFile};
 use marmor::tally::Tally;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
 
 /// A ball of wax under a lamp, in a faint environment, over a grey floor.
 pub const BASE: &str = r#"unit = "mm"
@@ -120,13 +118,7 @@ pub fn subsurface(estimator: Estimator, cache_samples: u32) -> SubsurfaceOptions
 
 /// The film of some passes, and what they cost.
 pub fn render<I: Integrator>(integrator: &I, scene: &Scene, backend: Backend, seed: u64, passes: u32) -> (Film, Tally) {
-    let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
-    let rays = query::build(backend, &meshes).unwrap();
-    let resolution = scene.camera.resolution;
-    let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-    let cancel = AtomicBool::new(false);
-    let job = Job { seed, passes: Some(passes), time: None, cancel: &cancel };
-    let outcome = run(integrator, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
+    let (film, outcome) = on(backend, scene, integrator, seed, 0..passes);
     (film, outcome.tally)
 }
 

@@ -1,13 +1,10 @@
 //! What is inside what: media, lamps and cameras in one another, surfaces that touch, meshes without an inside.
 
-use super::harness::{backends, load_with, refused};
-use marmor::film::{Film, Window};
-use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
-use marmor::query;
-use marmor::render::{self, Job};
+use super::harness::{backends, load_with, refused, render};
+use super::rendering::mean_of;
+use marmor::integrator::{VolumePath, VolumePathOptions, traceable};
 use marmor::scene::{ObstacleKind, Orders, Scene};
 use marmor::tally::Tally;
-use std::sync::atomic::AtomicBool;
 
 /// A box as OBJ text, its corners numbered from `first`; `inwards` turns its faces.
 fn cuboid(centre: [f64; 3], half: [f64; 3], first: u32, inwards: bool) -> String {
@@ -54,29 +51,17 @@ const OPTIONS: VolumePathOptions = VolumePathOptions { orders: Orders::All, phot
 /// Mean of every pixel over the channels, by paths, on each backend.
 fn traced(scene: &Scene, spp: u32) -> Vec<(Vec<f64>, Tally)> {
     let one = |backend| {
-        let rays = query::build(backend, &scene.meshes()).unwrap();
-        let resolution = scene.camera.resolution;
-        let mut film = Film::new(resolution, Window::full(resolution)).unwrap();
-        let cancel = AtomicBool::new(false);
-        let job = Job { seed: 1, passes: Some(spp), time: None, cancel: &cancel };
-        let method = VolumePath::new(scene, OPTIONS).unwrap();
-        let outcome = render::run(&method, View { scene, rays: &*rays }, &job, &mut film, &mut []).unwrap();
-        (film.image().pixels.iter().map(|p| f64::from(p.mean())).collect(), outcome.tally)
+        let (film, tally) = render(&VolumePath::new(scene, OPTIONS).unwrap(), scene, backend, 1, spp);
+        (film.image().pixels.iter().map(|p| f64::from(p.mean())).collect(), tally)
     };
     backends().map(one).collect()
-}
-
-fn mean(pixels: &[f64]) -> (f64, f64) {
-    let n = pixels.len() as f64;
-    let mean = pixels.iter().sum::<f64>() / n;
-    (mean, (pixels.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt())
 }
 
 /// A white furnace is white, to 5 standard errors, and nothing is lost.
 fn white(scene: &Scene) {
     assert_eq!(traceable(scene), []);
     for (pixels, tally) in traced(scene, 16) {
-        let (mean, error) = mean(&pixels);
+        let (mean, error) = mean_of(pixels);
         assert!(tally.walk.walks > 200 && tally.walk.losses.total() == 0, "{:?}", tally.walk);
         assert!(error < 0.03 && (mean - 1.0).abs() < 5.0 * error + 1e-4, "{mean} +- {error}");
     }
@@ -85,7 +70,7 @@ fn white(scene: &Scene) {
 /// The mean of the picture is `expected`, to 5 standard errors, and nothing is lost.
 fn is(scene: &Scene, expected: f64) {
     for (pixels, tally) in traced(scene, 1024) {
-        let (mean, error) = mean(&pixels);
+        let (mean, error) = mean_of(pixels);
         assert!(error < 0.01 * expected && (mean - expected).abs() < 5.0 * error, "{mean} +- {error}, {expected}");
         assert_eq!(tally.walk.losses.total(), 0);
     }

@@ -13,6 +13,8 @@ mod lights;
 mod list;
 mod media;
 mod meshes;
+#[path = "../parts/mod.rs"]
+mod parts;
 #[path = "../rendering/mod.rs"]
 mod rendering;
 mod sizes;

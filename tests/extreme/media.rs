@@ -4,7 +4,7 @@ use super::furnace::{self, ERRORS, Of, in_all_models, of_paths, translucent};
 use super::harness::{
     BALL, backends, load, load_with, medium, ok, refused, sound_in_all_models, subsurface_shot, warns,
 };
-use super::sizes::cuboid;
+use super::parts::centred;
 use marmor::bssrdf::{Bssrdf, Slab};
 use marmor::integrator::{VolumePath, VolumePathOptions};
 use marmor::math::Vec3;
@@ -233,7 +233,7 @@ fn sheet(depth: f64, wax: &str) -> marmor::scene::Scene {
          [environment]\nradiance = 1\n[[object]]\nname = \"body\"\nmesh = \"box.obj\"\nmaterial = \"wax\"\n\
          [material.wax]\ntype = \"translucent\"\n{wax}"
     );
-    load_with(&text, &[("box.obj", &cuboid(20.0, 0.5 * depth, 20.0))], false).unwrap()
+    load_with(&text, &[("box.obj", &centred([20.0, 0.5 * depth, 20.0]))], false).unwrap()
 }
 
 /// Reflected and transmitted light together, as the model's totals say.
@@ -318,7 +318,7 @@ fn values_below_zero_are_clamped_and_counted_warns() {
     // Light that leaves close to where it went in, through the other side of a sheet.
     let text = medium("[2, 3, 4]", "[0.05, 0.1, 0.2]", "eta = 1.3\nmodel = \"directional\"");
     let text = text.replace(BALL, "mesh = \"box.obj\"\nmaterial = \"wax\"");
-    let sheet = cuboid(1.0, 0.02, 1.0);
+    let sheet = centred([1.0, 0.02, 1.0]);
     let words = ["`directional` is a model of a half space", "0.04 units thick", "method `volume_path`"];
     let shots = warns(&load_with(&text, &[("box.obj", &sheet)], false).unwrap(), &words);
     let clamped: Vec<u64> = shots.iter().map(|s| s.tally.gather.clamped).collect();

@@ -1,7 +1,7 @@
 //! Broken meshes, and meshes that only look broken.
 
 use super::harness::{BALL, Shot, load, load_with, ok, refused, warns, with};
-use super::sizes::cuboid;
+use super::parts::centred;
 use marmor::scene::Scene;
 
 /// [`super::harness::BASE`] with this OBJ file for its body.
@@ -20,7 +20,7 @@ fn mended(obj: &str) -> Scene {
 }
 
 fn cube() -> String {
-    cuboid(0.8, 0.8, 0.8)
+    centred([0.8; 3])
 }
 
 fn same_pictures(a: &[Shot], b: &[Shot]) {
@@ -70,7 +70,7 @@ fn needles_ok() {
     obj += "v 1.000000001 -1 0\nv 1.000000001 1 0\nf 1 2 3 4\nf 2 5 6 3\nf 4 3 2 1\nf 3 6 5 2\n";
     let scene = body(&obj).unwrap();
     shots_of(&scene);
-    let closed = cuboid(1.0, 1.0, 1e-9 / 2.0);
+    let closed = centred([1.0, 1.0, 1e-9 / 2.0]);
     shots_of(&body(&closed).unwrap());
 }
 

@@ -1,6 +1,7 @@
 //! Very large, very small, very far, very thin.
 
 use super::harness::{BALL, load, load_with, medium, ok, sound_in_all_models, warns, with};
+use super::parts::centred;
 
 #[test]
 fn an_object_smaller_than_a_pixel_ok() {
@@ -21,7 +22,7 @@ fn an_object_smaller_than_a_mean_free_path_warns() {
 fn a_thin_sheet_warns() {
     let scene = load_with(
         &with(&[(BALL, "mesh = \"box.obj\"\nmaterial = \"wax\"")]),
-        &[("box.obj", &cuboid(1.0, 0.001, 1.0))],
+        &[("box.obj", &centred([1.0, 0.001, 1.0]))],
         false,
     );
     let scene = scene.unwrap();
@@ -33,18 +34,9 @@ fn a_thin_sheet_warns() {
 #[test]
 fn a_sheet_thinner_than_rounding_warns() {
     let text = with(&[(BALL, "mesh = \"box.obj\"\nmaterial = \"wax\"")]);
-    let scene = load_with(&text, &[("box.obj", &cuboid(1.0, 1e-7, 1.0))], false).unwrap();
+    let scene = load_with(&text, &[("box.obj", &centred([1.0, 1e-7, 1.0]))], false).unwrap();
     assert!(scene.why_double.as_ref().is_some_and(|why| why.contains("2e-7 units thick")), "{:?}", scene.why_double);
     warns(&scene, &["`standard` is a model of a half space", "method `volume_path`"]);
-}
-
-pub fn cuboid(x: f64, y: f64, z: f64) -> String {
-    let mut text = String::new();
-    for i in 0..8 {
-        let sign = |bit: u32| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
-        text += &format!("v {} {} {}\n", x * sign(0), y * sign(1), z * sign(2));
-    }
-    text + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n"
 }
 
 /// The whole scene by a factor, coefficients with it.

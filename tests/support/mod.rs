@@ -2,7 +2,7 @@
 #![allow(dead_code)] // each test file uses its part
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
-use marmor::bssrdf::ChannelMedium;
+use marmor::bssrdf::{Bssrdf, ChannelMedium, Entry, Exit};
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::Medium;
 use proptest::prelude::*;
@@ -74,6 +74,16 @@ pub fn channel(row: &Row) -> ChannelMedium {
 /// The same medium in three channels; nothing is checked.
 pub fn grey(sigma_s: f32, sigma_a: f32, g: f64, eta: f32) -> Medium {
     Medium { sigma_s: Rgb::splat(sigma_s), sigma_a: Rgb::splat(sigma_a), g, eta }
+}
+
+/// Channels do not know each other: each has the value and the total of a grey medium of its own.
+pub fn channels_are_grey_media<M: Bssrdf>(medium: &Medium, model: impl Fn(&Medium) -> M, entry: &Entry, exit: &Exit) {
+    let all = model(medium);
+    for c in 0..3 {
+        let one = model(&grey(medium.sigma_s[c], medium.sigma_a[c], medium.g, medium.eta));
+        assert_eq!(all.eval(entry, exit)[c], one.eval(entry, exit)[0]);
+        assert_eq!(all.total()[c], one.total()[0]);
+    }
 }
 
 /// Unit vectors.

@@ -13,6 +13,8 @@ mod draws;
 mod emission;
 mod facets;
 mod modelled;
+#[cfg(test)]
+mod near_checks;
 mod pencil;
 mod photons;
 mod spectrum;

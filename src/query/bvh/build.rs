@@ -7,7 +7,7 @@
 
 use rayon::prelude::*;
 
-use super::fold::{Fold, Place};
+use super::fold::{Fold, Slot};
 use super::node::{Child, Node, WIDTH};
 use super::split::{self, Range, Ref};
 use super::stack::STACK;
@@ -102,10 +102,10 @@ impl Tree {
     }
 
     /// Nodes and packs of a folded range, depth first.
-    fn grow(&mut self, source: &Source<'_>, fold: &Fold, refs: &[Ref], place: Place) -> (Child, Aabb32) {
+    fn grow(&mut self, source: &Source<'_>, fold: &Fold, refs: &[Ref], place: Slot) -> (Child, Aabb32) {
         match place {
-            Place::Leaf { start, count } => self.push_leaf(source, &refs[start..start + count]),
-            Place::Node(at) => {
+            Slot::Leaf { start, count } => self.push_leaf(source, &refs[start..start + count]),
+            Slot::Node(at) => {
                 let node = self.nodes.len();
                 self.nodes.push(Node::new(&[]));
                 let children: Vec<(Child, Aabb32)> =

@@ -218,7 +218,7 @@ struct Group<'a, S: Simd> {
 
 /// A box to visit: its node, its lane there, and the packets that have entered the box around it.
 #[derive(Clone, Copy)]
-struct Place {
+struct Visit {
     node: u32,
     lane: u8,
     packets: u8,
@@ -246,7 +246,7 @@ impl<'a, S: Simd> Group<'a, S> {
 
     #[inline(always)]
     fn trace(&mut self, tree: &Tree, root: u32) {
-        let mut stack = Stack::<Place, STACK>::new();
+        let mut stack = Stack::<Visit, STACK>::new();
         let all = 0xff >> (PACKETS - self.rays.len().div_ceil(RAYS));
         self.push_children(tree, root, all, &mut stack);
         while let Some((place, near)) = stack.pop() {
@@ -257,7 +257,7 @@ impl<'a, S: Simd> Group<'a, S> {
     }
 
     #[inline(always)]
-    fn push_children(&self, tree: &Tree, index: u32, packets: u8, stack: &mut Stack<Place, STACK>) {
+    fn push_children(&self, tree: &Tree, index: u32, packets: u8, stack: &mut Stack<Visit, STACK>) {
         let node = &tree.nodes[index as usize];
         let (first, last) = node.all_planes(self.simd, self.first);
         let (mut inside, near) = self.pyramid.enter(first, last, F8::splat(self.simd, self.t_max));
@@ -266,12 +266,12 @@ impl<'a, S: Simd> Group<'a, S> {
         while inside != 0 {
             let lane = inside.trailing_zeros() as usize % WIDTH;
             inside &= inside - 1;
-            stack.insert(from, Place { node: index, lane: lane as u8, packets }, near[lane]);
+            stack.insert(from, Visit { node: index, lane: lane as u8, packets }, near[lane]);
         }
     }
 
     #[inline(always)]
-    fn visit(&mut self, tree: &Tree, place: Place, stack: &mut Stack<Place, STACK>) {
+    fn visit(&mut self, tree: &Tree, place: Visit, stack: &mut Stack<Visit, STACK>) {
         let node = &tree.nodes[place.node as usize];
         let (first, last) = node.box_planes(self.simd, place.lane as usize, self.first);
         let mut entered = [0_u8; PACKETS];

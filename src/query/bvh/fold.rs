@@ -43,7 +43,7 @@ pub struct Fold {
 
 /// What takes one place in a node.
 #[derive(Clone, Copy, Debug)]
-pub enum Place {
+pub enum Slot {
     /// The triangles from `start` on, `count` of them.
     Leaf { start: usize, count: usize },
     /// A node; [`Fold::places`] has its children.
@@ -116,21 +116,21 @@ impl Fold {
     }
 
     /// What the whole range became.
-    pub fn root(&self) -> Place {
+    pub fn root(&self) -> Slot {
         self.single(0)
     }
 
-    fn single(&self, at: u32) -> Place {
+    fn single(&self, at: u32) -> Slot {
         let node = &self.nodes[at as usize];
         if node.how[0] == NODE {
-            Place::Node(at)
+            Slot::Node(at)
         } else {
-            Place::Leaf { start: node.start as usize, count: node.count as usize }
+            Slot::Leaf { start: node.start as usize, count: node.count as usize }
         }
     }
 
     /// The children of a node.
-    pub fn places(&self, node: u32) -> Vec<Place> {
+    pub fn places(&self, node: u32) -> Vec<Slot> {
         let mut places = Vec::with_capacity(WIDTH);
         let children = self.nodes[node as usize].children;
         let [left, right] = [0, 1].map(|side| self.nodes[children as usize + side].cost);
@@ -143,14 +143,14 @@ impl Fold {
         places
     }
 
-    fn half_area(&self, place: Place) -> f32 {
+    fn half_area(&self, place: Slot) -> f32 {
         match place {
-            Place::Node(at) => self.nodes[at as usize].half_area,
-            Place::Leaf { .. } => 0.0,
+            Slot::Node(at) => self.nodes[at as usize].half_area,
+            Slot::Leaf { .. } => 0.0,
         }
     }
 
-    fn spread(&self, at: u32, places: usize, into: &mut Vec<Place>) {
+    fn spread(&self, at: u32, places: usize, into: &mut Vec<Slot>) {
         let node = &self.nodes[at as usize];
         match node.how[places - 1] {
             LEAF | NODE => into.push(self.single(at)),
