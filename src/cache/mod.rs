@@ -1,11 +1,13 @@
 //! Transmitted-light points of one pass on one translucent mesh, and the estimators that gather over them.
 //! Not for: what happens at the exit (`integrator/subsurface.rs`). Read first: `fill.rs`, `notes.rs`, then `cut.rs`.
 
+mod balance;
 mod columns;
 mod cut;
 mod density;
 mod envelope;
 mod estimate;
+mod even;
 mod fill;
 mod near;
 mod notes;
@@ -16,11 +18,13 @@ mod tree;
 
 use crate::bssrdf::Entry;
 use crate::math::Rgb;
+pub use balance::Balance;
 pub use columns::Columns;
 pub use cut::{Cut, Scratch, Tuning};
 pub use density::Density;
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Gatherer, PLAIN_SUM};
+pub use even::balance;
 pub use fill::{Directions, Filler, Receiver, Shadow};
 pub use near::{GatherPoint, NearField, Step};
 pub use notes::notes;

@@ -2,8 +2,8 @@
 //! way of a pass.
 
 use super::{
-    Cache, CachedSample, Columns, Density, Directions, Envelope, Filler, GatherPoint, Gatherer, NearField, Receiver,
-    Scratch, Seen, Survey, Tuning,
+    Balance, Cache, CachedSample, Columns, Density, Directions, Envelope, Filler, GatherPoint, Gatherer, NearField,
+    Receiver, Scratch, Seen, Survey, Tuning,
 };
 use crate::bssrdf::{Entry, Exit, Partition};
 use crate::error::Result;
@@ -105,6 +105,7 @@ pub struct Plan {
     /// Cached samples a pass.
     pub samples: u32,
     survey: OnceLock<Survey>,
+    balance: OnceLock<Option<Balance>>,
 }
 
 impl Plan {
@@ -128,8 +129,9 @@ impl Plan {
         };
         let (near, samples) = near_field(&envelope, table.area(), &options);
         let body = Receiver { object, table, model, eta: t.medium.eta };
-        let survey = OnceLock::new();
-        Ok(Some(Self { options, body, medium: t.medium, envelope, directions, streams, near, samples, survey }))
+        let (survey, balance) = (OnceLock::new(), OnceLock::new());
+        let medium = t.medium;
+        Ok(Some(Self { options, body, medium, envelope, directions, streams, near, samples, survey, balance }))
     }
 
     /// The object's medium.
@@ -180,6 +182,14 @@ impl Plan {
         cache
     }
 
+    /// From here on sums are balanced by what `make` gives, the first time.
+    pub fn balanced_by(&self, make: impl FnOnce() -> Option<Balance>) {
+        // Not while it is made: that takes sums as they are.
+        if self.balance.get().is_none() {
+            let _ = self.balance.set(make());
+        }
+    }
+
     /// Where samples are spent, as the survey says.
     pub fn density(&self) -> &Density {
         &self.survey.get_or_init(Survey::none).density
@@ -219,6 +229,9 @@ impl Plan {
         let kernel = (&*self.body.model, &self.envelope);
         Clock::time(&mut tally.clock.gather, || {
             gatherer.gather(kernel, &exits, &keys, scratch, &mut tally.gather, sums);
+            if let Some(Some(balance)) = self.balance.get() {
+                points.iter().zip(sums.iter_mut()).for_each(|(p, sum)| *sum = *sum * balance.at(p.place, p.exit.n));
+            }
         });
     }
 

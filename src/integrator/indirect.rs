@@ -22,7 +22,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// Paths of each kind in a pass for so many of its samples.
-const SAMPLES_PER_PATH: u32 = 4;
+const SAMPLES_PER_PATH: u32 = 8;
 /// Paths of one task; exits of one task are neighbours, and gathered together.
 const CHUNK: usize = 1024;
 /// A round of fewer exits is made by chance, with more weight.

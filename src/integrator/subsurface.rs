@@ -8,7 +8,7 @@ use super::single::Single;
 use super::volume_path::{Asked, Modelled, Scratch as PathScratch};
 use super::{CameraRay, Integrator, KnownLights, Part, camera_hits};
 use crate::bssrdf::Exit;
-use crate::cache::{Cache, GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, seen};
+use crate::cache::{Cache, GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, balance, seen};
 use crate::error::Result;
 use crate::geometry::{Solid, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -239,6 +239,10 @@ impl Integrator for Subsurface {
             self.surveyed.call_once(|| {
                 let each = self.plans.iter().zip(seen(view));
                 each.for_each(|(plan, seen)| plan.iter().for_each(|plan| plan.survey(view, lights, &seen)));
+                if self.indirect.is_some() {
+                    let seed = self.options.seed;
+                    self.plans.iter().flatten().for_each(|plan| plan.balanced_by(|| balance(plan, view, seed)));
+                }
             });
         });
         let mut fill = |plan: &Option<Arc<Plan>>| Some(plan.as_ref()?.fill(view, lights, pass, tally));

@@ -1,0 +1,65 @@
+//! What a model of a plane sends out on the body it is used for, held to what it sends out on a plane.
+//!
+//! Under even light from all sides S_d integrates over a plane to the model's total. Over a real surface it does not: in a fold, or
+//! through a thin wall, more surface lies within reach, on a ridge less. Where light enters a body again and again that would add up
+//! without end. So what is gathered is divided by what even light would bring there, and multiplied by what it brings on a plane: a mean
+//! of the light around, whose weights add up to the total. A white furnace of a body that absorbs nothing is then white at every point.
+
+use crate::math::{DVec3, Rgb, Vec3};
+use std::collections::HashMap;
+use std::f64::consts::PI;
+
+/// Points that a mean is taken over, on a plane.
+const NEIGHBOURS: f64 = 12.0;
+
+/// Factors over the surface of a body.
+pub struct Balance {
+    /// Points by cube of space.
+    cells: HashMap<[i32; 3], Vec<Known>>,
+    centre: DVec3,
+    radius: f32,
+}
+
+/// What is known of a point of the surface.
+pub struct Known {
+    /// The point, relative to the centre of the body.
+    pub x: Vec3,
+    /// Normal there.
+    pub n: Vec3,
+    /// What even light brings, over what it brings on a plane.
+    pub share: Rgb,
+}
+
+impl Balance {
+    /// By points that lie evenly on a surface of `area` [unit²].
+    pub fn new(known: Vec<Known>, area: f64, centre: DVec3) -> Self {
+        let radius = (NEIGHBOURS * area / (PI * known.len() as f64)).sqrt() as f32;
+        let mut cells: HashMap<[i32; 3], Vec<Known>> = HashMap::new();
+        known.into_iter().for_each(|k| cells.entry(cell(k.x, radius)).or_default().push(k));
+        Self { cells, centre, radius }
+    }
+
+    /// The factor for what is gathered at a place with normal `n`.
+    pub fn at(&self, place: DVec3, n: Vec3) -> Rgb {
+        let x = (place - self.centre).as_vec3();
+        let [i, j, k] = cell(x, self.radius);
+        let (mut sum, mut weights) = (Rgb::BLACK, 0.0);
+        for d in 0..27 {
+            let Some(known) = self.cells.get(&[i + d % 3 - 1, j + d / 3 % 3 - 1, k + d / 9 - 1]) else { continue };
+            for known in known {
+                let near = 1.0 - (known.x - x).length_squared() / (self.radius * self.radius);
+                if near > 0.0 {
+                    // A face that looks away is hardly one with this.
+                    let weight = near * near * known.n.dot(n).max(0.01);
+                    sum += known.share * weight;
+                    weights += weight;
+                }
+            }
+        }
+        if weights > 0.0 { sum.map(|s| weights / s) } else { Rgb::WHITE }
+    }
+}
+
+fn cell(x: Vec3, edge: f32) -> [i32; 3] {
+    (x / edge).floor().as_ivec3().to_array()
+}

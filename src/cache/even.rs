@@ -1,0 +1,75 @@
+//! Even light from all sides on a body, for its [`Balance`].
+
+use super::balance::Known;
+use super::{Balance, Cache, CachedSample, GatherPoint, Gatherer, Plan, Scratch, Tuning};
+use crate::bssrdf::{Exit, ModelName, Partition};
+use crate::geometry::SurfacePoint;
+use crate::math::{Rgb, Vec4};
+use crate::optics::FresnelMoments;
+use crate::sampling::{CacheStream, PixelStream, Points, cosine_hemisphere};
+use crate::scene::{Estimator, View};
+use crate::tally::Tally;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+
+/// Samples of even light.
+const SAMPLES: u32 = 1 << 16;
+/// Points where what it brings is gathered.
+const POINTS: u32 = 1 << 14;
+/// The largest share of the sum that one node of a cut may be wrong by: means over neighbours even it out.
+const ERROR: f32 = 0.2;
+/// Points gathered together.
+const CHUNK: usize = 1024;
+
+/// The balance of the body of `plan`; a function of scene and seed. `None` for models of sheets, which have two faces, and where light comes no
+/// farther than to the next sample of a cache.
+pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
+    let body = &plan.body;
+    let surface = view.scene.surface(body.object).inside.as_ref()?;
+    if body.model.name() == ModelName::SLAB || plan.near.is_some() {
+        return None;
+    }
+    let normalised = surface.model.normalises_exit(surface.exit_normalisation);
+    let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
+    let on_a_plane = body.model.total().map(|total| (f64::from(total) / (PI * exit)) as f32);
+    let mesh = &view.scene.objects[body.object as usize].mesh;
+    let flat = |(pick, u): (f64, [f32; 7])| {
+        let at = body.table.sample(pick, [u[0], u[1]]);
+        let at = mesh.point(at.triangle, at.u, at.v);
+        SurfacePoint { n: at.n_geometric, ..at }
+    };
+    let [light, points] = [1, 2].map(|k| CacheStream::new(Points::Sobol, seed, k << 32 | u64::from(body.object)));
+    let enter = |i: u64| {
+        let numbers = light.numbers(i);
+        let at = flat(numbers);
+        let w = cosine_hemisphere(at.n, [numbers.1[2], numbers.1[3]]);
+        body.enters(&at, w, (Rgb::WHITE, body.table.area() as f32), numbers.1[4])
+    };
+    let lit: Vec<CachedSample> = (0..u64::from(SAMPLES)).into_par_iter().filter_map(enter).collect();
+    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(SAMPLES) / body.table.area();
+    let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition: Partition::NONE };
+    let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: SAMPLES }, &*body.model, tuning);
+    let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(POINTS)).map(|i| points.numbers(i)).collect();
+    picks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+    let known: Vec<Vec<Known>> = picks
+        .par_chunks(CHUNK)
+        .enumerate()
+        .map(|(chunk, picks)| {
+            let point = |(i, &numbers): (usize, &(f64, [f32; 7]))| {
+                let at = flat(numbers);
+                let exit = Exit { x: (at.x - body.table.centre()).as_vec3(), n: at.n, w: at.n };
+                GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) }
+            };
+            let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
+            let mut sums = Vec::new();
+            plan.sum(&gatherer, &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
+            let share = |sum: &Rgb| {
+                let share = |c: usize| (f64::from(sum[c]) / entered / f64::from(on_a_plane[c])) as f32;
+                // A channel that no light comes out of is as good as any.
+                Rgb::from_fn(|c| if share(c).is_normal() { share(c) } else { 1.0 })
+            };
+            points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, share: share(sum) }).collect()
+        })
+        .collect();
+    Some(Balance::new(known.into_iter().flatten().collect(), body.table.area(), body.table.centre()))
+}

@@ -1,0 +1,157 @@
+//! Light over other surfaces: closed forms of rooms, white furnaces of several bodies, and what is the same however it is found.
+#![allow(clippy::unwrap_used)] // a scene of a test that does not load has failed
+
+mod parts;
+mod rendering;
+
+use marmor::integrator::{Integrator, Path, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
+use marmor::scene::{Estimator, Orders, Scene};
+use parts::{camera, diffuse, emissive, rectangle, sky, sphere, translucent};
+use rendering::{Within, agree, channels, film, load, means_of, options, subsurface};
+use std::f64::consts::PI;
+
+/// Means over the picture, from independent renders.
+fn means<I: Integrator>(scene: &Scene, passes: u32, runs: u64, of: impl Fn(u64) -> I) -> [(f64, f64); 3] {
+    let run = |seed| channels(&film(&of(seed), scene, passes, seed, &mut []).image());
+    means_of(&(1..=runs).map(run).collect::<Vec<_>>())
+}
+
+/// Ten runs know their error to 24 %.
+const WITHIN: Within = Within { errors: 6.0, noise: 0.01 };
+
+/// In a sphere that reflects evenly, light that was reflected once lights every place alike: with flux Φ of a small lamp,
+/// albedo ρ and area A the irradiance by reflected light is ρ Φ / A / (1 - ρ) [Walsh 1926], here less what meets the lamp again.
+#[test]
+fn a_sphere_is_lit_evenly_by_what_it_reflects() {
+    let (side, albedo) = (0.05, [0.2, 0.5, 0.9]);
+    let text = camera([0.2, 0.0, 0.0], [1.0, 0.0, 0.0], 60.0, [6, 6])
+        + &sphere("room", [0.0; 3], 1.0, 64, "wall").replace("material", "flip = true\nmaterial")
+        + &rectangle("lamp", [-0.3, 0.1, 0.0], [side, 0.0, 0.0], [0.0, side, 0.0], "glow")
+        + &diffuse("wall", albedo)
+        + &emissive("glow", 1.0).replace("radiance", "two_sided = true\nradiance");
+    let scene = load(&text);
+    let area = |o: usize| {
+        (0..scene.objects[o].mesh.triangles.len() as u32).map(|t| scene.objects[o].mesh.area(t)).sum::<f64>()
+    };
+    let (room, lamp) = (area(0), 2.0 * area(1));
+    let back = 1.0 - lamp / room;
+    let straight = means(&scene, 64, 10, |seed| Path::new(&scene, Some(0), seed).unwrap());
+    for most in [Some(1), Some(3), None] {
+        let all = means(&scene, 64, 10, |seed| Path::new(&scene, most, seed).unwrap());
+        for (c, rho) in albedo.into_iter().enumerate() {
+            let rounds: f64 = match most {
+                Some(most) => (0..most).map(|n| (rho * back).powi(n as i32)).sum(),
+                None => 1.0 / (1.0 - rho * back),
+            };
+            let reflected = rho / PI * (rho * PI * lamp / room) * back * rounds;
+            let error = straight[c].1;
+            agree(all[c], (straight[c].0 + reflected, error), WITHIN, &format!("{most:?} bounces, albedo {rho}"));
+        }
+    }
+}
+
+/// Two bodies that touch nearly, above a white floor.
+fn bodies(scattering: f64, absorption: f64, more: &str) -> String {
+    let medium = format!(
+        "sigma_s = [{}, {}, {}]\nsigma_a = {absorption:?}\neta = 1.3",
+        scattering,
+        2.0 * scattering,
+        4.0 * scattering
+    );
+    camera([0.0, 3.0, 12.0], [0.5, -0.2, 0.0], 14.0, [16, 12])
+        + &sphere("large", [0.0; 3], 1.0, 24, "milk")
+        + &sphere("small", [1.6, -0.35, 0.4], 0.6, 24, "milk")
+        + &rectangle("floor", [0.0, -1.02, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0], "floor")
+        + &translucent("milk", &medium)
+        + more
+}
+
+/// Nothing is lost between bodies and walls that absorb nothing: all is as white as the sky. On a ball of 500 to 2000 mean free paths
+/// the model is that of a plane to a thousandth; without light over other surfaces a quarter is missing.
+#[test]
+fn white_bodies_over_a_white_floor_are_white() {
+    let scene = load(&bodies(500.0, 0.0, &(diffuse("floor", 1.0) + &sky(1.0))));
+    for (what, estimator, samples) in [("near field", Estimator::Cut, 16384), ("cache", Estimator::Thinned, 8192)] {
+        let all = means(&scene, 12, 10, |seed| subsurface(&scene, options(estimator, samples, seed)));
+        for c in all {
+            agree(c, (1.0, 0.0), Within { errors: 6.0, noise: 0.004 }, what);
+        }
+    }
+    let straight = means(&scene, 4, 4, |seed| {
+        subsurface(&scene, SubsurfaceOptions { bounces: 0, ..options(Estimator::Cut, 16384, seed) })
+    });
+    assert!(straight[0].0 < 0.9, "{straight:?}");
+}
+
+/// However the light of a pass is summed: by the cache alone, exit by exit, or with a near field, whose light over other surfaces comes
+/// by steps of the paths.
+#[test]
+fn a_near_field_has_the_light_that_the_cache_has() {
+    let lamp = rectangle("lamp", [0.0, 5.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "glow") + &emissive("glow", 10.0);
+    let scene = load(&bodies(60.0, 0.5, &(diffuse("floor", [0.8, 0.6, 0.4]) + &lamp)));
+    let of = |samples| move |estimator| move |seed| options(estimator, samples, seed);
+    let near = Subsurface::new(&scene, of(2048)(Estimator::Cut)(1)).unwrap();
+    assert_eq!(near.near_fields(), 2, "the near field is what this is about");
+    let near = means(&scene, 24, 10, |seed| subsurface(&scene, of(2048)(Estimator::Cut)(seed)));
+    let cache = means(&scene, 24, 10, |seed| subsurface(&scene, of(16384)(Estimator::Thinned)(seed)));
+    for c in 0..3 {
+        agree(near[c], cache[c], WITHIN, "near field against cache");
+    }
+}
+
+/// Clear bodies have no model: what `subsurface` shows of them is what `volume_path` does, by other ways: light goes from body to body
+/// forwards there.
+#[test]
+fn light_passes_straight_through_clear_bodies() {
+    let lamp = rectangle("lamp", [0.0, 5.0, 1.0], [3.0, 0.0, 0.0], [0.0, 0.0, 3.0], "glow") + &emissive("glow", 3.0);
+    let more = diffuse("floor", [0.8, 0.6, 0.4]) + &lamp + &sky(0.3);
+    let clear = "sigma_s = [1e-9, 1e-9, 1e-9]\nsigma_a = [0.1, 0.3, 1.0]\neta = 1.3";
+    let text = bodies(1.0, 0.0, &more);
+    let start = text.find("sigma_s").unwrap();
+    let end = text.find("eta = 1.3").unwrap() + "eta = 1.3".len();
+    let scene = load(&format!("{}{clear}{}", &text[..start], &text[end..]));
+    let model = means(&scene, 96, 10, |seed| subsurface(&scene, options(Estimator::Cut, 4096, seed)));
+    let truth = means(&scene, 96, 10, |seed| {
+        let options = VolumePathOptions { orders: Orders::All, photons: 0, seed, ..Default::default() };
+        VolumePath::new(&scene, options).unwrap()
+    });
+    for c in 0..3 {
+        agree(model[c], truth[c], WITHIN, "clear bodies");
+    }
+}
+
+/// A convex body alone costs what it cost: the same picture, bit for bit, and `check` says why.
+#[test]
+fn what_nothing_reflects_to_is_left_out() {
+    let lamp = rectangle("lamp", [0.0, 5.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "glow") + &emissive("glow", 10.0);
+    let start = camera([0.0, 3.0, 12.0], [0.0; 3], 14.0, [16, 12])
+        + &translucent("milk", "sigma_s = 20\nsigma_a = 0.1\neta = 1.3");
+    let ball = sphere("ball", [0.0; 3], 1.0, 16, "milk");
+    let black =
+        rectangle("floor", [0.0, -1.02, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0], "floor") + &diffuse("floor", 0.0);
+    let grey =
+        rectangle("floor", [0.0, -1.02, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0], "floor") + &diffuse("floor", 0.2);
+    for (more, needed) in [("", false), (black.as_str(), false), (grey.as_str(), true)] {
+        let scene = load(&format!("{start}{ball}{lamp}{more}"));
+        let all = subsurface(&scene, options(Estimator::Cut, 4096, 1));
+        let straight = subsurface(&scene, SubsurfaceOptions { bounces: 0, ..options(Estimator::Cut, 4096, 1) });
+        let image = |method: &Subsurface| film(method, &scene, 2, 1, &mut []).image();
+        assert_eq!(image(&all) != image(&straight), needed, "{more}");
+        let part = all.parts(&scene).into_iter().find(|part| part.name == "light over other surfaces").unwrap();
+        assert_eq!(part.built, needed, "{}", part.why);
+        assert!(straight.parts(&scene).iter().any(|part| part.why.contains("switched off: light comes straight")));
+    }
+}
+
+/// No thread's work, and no pass's, depends on another's.
+#[test]
+fn the_bytes_are_the_same_for_any_number_of_threads() {
+    let lamp = rectangle("lamp", [0.0, 5.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "glow") + &emissive("glow", 10.0);
+    let scene = load(&bodies(60.0, 0.5, &(diffuse("floor", 0.5) + &lamp)));
+    let images = [1, 2, 5].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let method = subsurface(&scene, SubsurfaceOptions { single: true, ..options(Estimator::Cut, 4096, 1) });
+        pool.install(|| film(&method, &scene, 3, 1, &mut []).image())
+    });
+    assert!(images[0] == images[1] && images[1] == images[2]);
+}
