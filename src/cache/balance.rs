@@ -2,8 +2,9 @@
 //!
 //! Under even light from all sides S_d integrates over a plane to the model's total. Over a real surface it does not: in a fold, or
 //! through a thin wall, more surface lies within reach, on a ridge less. Where light enters a body again and again that would add up
-//! without end. So what is gathered is divided by what even light would bring there, and multiplied by what it brings on a plane: a mean
-//! of the light around, whose weights add up to the total. A white furnace of a body that absorbs nothing is then white at every point.
+//! without end. Light in the body has two ends: it leaves, on a plane the share P of it, or is absorbed. With s times the surface within reach it
+//! leaves s times as fast, and is absorbed as fast as before: s P / (s P + 1 - P) leave. So what is gathered is divided by s P + 1 - P. No
+//! more leaves than has entered, and a white furnace of a body that absorbs nothing is white at every point of any shape.
 
 use crate::math::{DVec3, Rgb, Vec3};
 use std::collections::HashMap;
@@ -26,8 +27,8 @@ pub struct Known {
     pub x: Vec3,
     /// Normal there.
     pub n: Vec3,
-    /// What even light brings, over what it brings on a plane.
-    pub share: Rgb,
+    /// What sums here are divided by: s P + 1 - P, s being what even light brings over what it brings on a plane.
+    pub divisor: Rgb,
 }
 
 impl Balance {
@@ -51,7 +52,7 @@ impl Balance {
                 if near > 0.0 {
                     // A face that looks away is hardly one with this.
                     let weight = near * near * known.n.dot(n).max(0.01);
-                    sum += known.share * weight;
+                    sum += known.divisor * weight;
                     weights += weight;
                 }
             }

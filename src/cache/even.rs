@@ -31,7 +31,8 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     }
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
-    let on_a_plane = body.model.total().map(|total| (f64::from(total) / (PI * exit)) as f32);
+    let total = body.model.total();
+    let on_a_plane = total.map(|total| (f64::from(total) / (PI * exit)) as f32);
     let mesh = &view.scene.objects[body.object as usize].mesh;
     let flat = |(pick, u): (f64, [f32; 7])| {
         let at = body.table.sample(pick, [u[0], u[1]]);
@@ -63,12 +64,15 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
             let mut sums = Vec::new();
             plan.sum(&gatherer, &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
-            let share = |sum: &Rgb| {
-                let share = |c: usize| (f64::from(sum[c]) / entered / f64::from(on_a_plane[c])) as f32;
+            let divisor = |sum: &Rgb| {
+                let divisor = |c: usize| {
+                    let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]));
+                    (s * p + 1.0 - p) as f32
+                };
                 // A channel that no light comes out of is as good as any.
-                Rgb::from_fn(|c| if share(c).is_normal() { share(c) } else { 1.0 })
+                Rgb::from_fn(|c| if divisor(c).is_normal() { divisor(c) } else { 1.0 })
             };
-            points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, share: share(sum) }).collect()
+            points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, divisor: divisor(sum) }).collect()
         })
         .collect();
     Some(Balance::new(known.into_iter().flatten().collect(), body.table.area(), body.table.centre()))

@@ -211,6 +211,9 @@ fn lets_light_through(scene: &Scene, object: u32, medium: &Medium) -> bool {
     scene.objects[object as usize].thickness().is_some_and(|thickness| least * thickness < OPAQUE)
 }
 
+/// Dents no deeper than this share of a body are rounding: four corners of a plane face are not in one plane.
+const ROUNDING: f64 = 1e-6;
+
 /// Whether any light comes over another surface: not where one convex body stands alone among lights.
 fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOptions) -> bool {
     if options.bounces == 0 {
@@ -224,7 +227,8 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
         (None, _) => false,
         (Some((i, object)), None) => {
             let clear = modelled[i].as_ref().is_some_and(|m| m.walked == Some(0));
-            clear || !Solid::new(&object.mesh).is_convex(0.0)
+            let size = object.mesh.bounds().map_or(0.0, |bounds| bounds.extent().max_element());
+            clear || !Solid::new(&object.mesh).is_convex(ROUNDING * size)
         }
         _ => true,
     }

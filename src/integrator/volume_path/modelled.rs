@@ -42,6 +42,8 @@ impl Watch for AtMost {
     }
 }
 
+/// A path of at least this weight asks every model on its way.
+const ASKING: f32 = 0.25;
 /// Purpose of the numbers of a path's later questions.
 const LATER: u64 = 0x006c_6174_6572;
 /// And of steps.
@@ -175,7 +177,11 @@ impl CameraPath<'_> {
         let stream = self.stream.aside(hash_combine(LATER, self.asked.into()));
         self.asked += 1;
         let weight = self.spectrum.value_outside();
-        self.scratch.asked.push(Asked { object: hit.mesh, at: *at, w, weight, stream });
+        // A sum over a cache costs as much as many rays: of paths of little weight some ask, with more.
+        let chance = (weight.max() / ASKING).min(1.0);
+        if self.draws.number() < chance {
+            self.scratch.asked.push(Asked { object: hit.mesh, at: *at, w, weight: weight * (1.0 / chance), stream });
+        }
         let outside = self.view.outwards(hit).n_geometric.dot(w) > 0.0;
         let body = self.method.body(hit.mesh).filter(|_| model.walked.is_some() && outside);
         let step = match (&model.near, body) {
