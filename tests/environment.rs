@@ -4,7 +4,7 @@
 use marmor::ErrorKind;
 use marmor::film::{Film, Image, Metadata, PngOptions, Window, save};
 use marmor::integrator::{Direct, Integrator, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions};
-use marmor::light::Sky;
+use marmor::light::{Light, Sky};
 use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::query::{self, Backend};
 use marmor::render::{self, Job};
