@@ -80,15 +80,14 @@ impl Choice {
         }
     }
 
-    /// One of them for no place, by power.
-    pub fn pick_by_power(&self, u: f32, more: [f32; 2]) -> Option<Pick> {
+    fn pick_by_power(&self, u: f32, more: [f32; 2]) -> Option<Pick> {
         let pick = self.number(u, more);
         let light = self.cumulative.partition_point(|&c| c <= pick).min(self.len().checked_sub(1)?);
         let (below, chance) = (self.below(light), self.share(light));
         Some(Pick { light, chance, left: (pick - below) / chance })
     }
 
-    /// The share of number `light` in the power of all: its chance by [`Self::pick_by_power`].
+    /// The share of number `light` in the power of all.
     pub fn share(&self, light: usize) -> f64 {
         self.cumulative[light] - self.below(light)
     }

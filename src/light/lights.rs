@@ -245,26 +245,9 @@ impl Lights {
     /// A point of one of a group of lights, or a direction to it, for `from`. `None` where none of them can shine.
     pub fn sample(&self, scene: &Scene, group: Group, from: &Reference, u: [f32; 3]) -> Option<LightSample> {
         let Asked { lights, choice } = self.group(group);
-        self.of_pick(scene, lights, choice.pick(from, u[0], [u[1], u[2]])?, from, [u[1], u[2]])
-    }
-
-    /// A point of a light at a place, chosen by power for no place in particular.
-    pub fn sample_by_power(&self, scene: &Scene, u: [f32; 3]) -> Option<LightSample> {
-        let Asked { lights, choice } = self.group(Group::Near);
-        let nowhere = Reference { x: DVec3::ZERO, n: None, reach: f32::INFINITY };
-        self.of_pick(scene, lights, choice.pick_by_power(u[0], [u[1], u[2]])?, &nowhere, [u[1], u[2]])
-    }
-
-    fn of_pick(
-        &self,
-        scene: &Scene,
-        lights: &[u32],
-        Pick { light, chance, left }: Pick,
-        from: &Reference,
-        u: [f32; 2],
-    ) -> Option<LightSample> {
+        let Pick { light, chance, left } = choice.pick(from, u[0], [u[1], u[2]])?;
         let i = lights[light] as usize;
-        let own = self.lights[i].sample(scene, from, left, u)?;
+        let own = self.lights[i].sample(scene, from, left, [u[1], u[2]])?;
         Some(LightSample { pdf: chance * own.pdf, light: self.number_in_tally(i), ..own })
     }
 
@@ -331,13 +314,6 @@ impl Lights {
         hit.t * pdf * hit.t / cos
     }
 
-    /// Density of points [1/unit²] by [`Self::sample_by_power`] on the object number `object`; 0 if it is no light.
-    pub fn pdf_by_power(&self, object: u32) -> f32 {
-        let from = Reference { x: DVec3::ZERO, n: None, reach: f32::INFINITY };
-        let near = &self.group(Group::Near).choice;
-        self.of_object(object).map_or(0.0, |i| (near.share(i) * self.lights[i].pdf(&from, Vec3::ZERO)) as f32)
-    }
-
     /// Density [1/sr] of `w` by [`Self::sample`] of what is far; 0 where nothing is.
     #[inline]
     pub fn pdf_far(&self, w: Vec3) -> f32 {
@@ -357,17 +333,20 @@ impl Lights {
     pub fn least_solid_pdf(&self, object: u32, bounds: &Aabb) -> f32 {
         let Some(i) = self.of_object(object) else { return 0.0 };
         let Some(own) = self.lights[i].bounds().map(|b| b.bounds) else { return 0.0 };
-        let choice = &self.group(Group::Near).choice;
         let square = |gap: f64| gap as f32 * gap as f32;
-        if !choice.is_by_tree() {
-            return self.pdf_by_power(object) * square(own.distance(bounds));
+        let middle = Reference::body(bounds);
+        if !self.group(Group::Near).choice.is_by_tree() {
+            return self.pdf_point(&middle, object) * square(own.distance(bounds));
         }
         let corner = |k: usize| {
-            DVec3::from_array(std::array::from_fn(|a| if k >> a & 1 == 0 { bounds.lower[a] } else { bounds.upper[a] }))
+            let side = |axis: usize| if k >> axis & 1 == 0 { bounds.lower[axis] } else { bounds.upper[axis] };
+            DVec3::from_array(std::array::from_fn(side))
         };
-        let at =
-            |x: DVec3| self.pdf_point(&Reference::inside(x, bounds), object) * square(own.distance(&Aabb::around([x])));
-        (0..8).map(corner).chain([bounds.centre()]).map(at).fold(f32::INFINITY, f32::min)
+        let at = |x: DVec3| {
+            let from = Reference::inside(x, bounds);
+            self.pdf_point(&from, object) * square(own.distance(&Aabb::around([x])))
+        };
+        (0..8).map(corner).chain([middle.x]).map(at).fold(f32::INFINITY, f32::min)
     }
 
     /// Share of directions that are better picked by the cosine for a body within `bounds`: half with an environment, none

@@ -81,6 +81,11 @@ impl Reference {
         Self { x: at.x, n: Some(at.n), reach: 0.0 }
     }
 
+    /// A body within `bounds`, no place of it in particular.
+    pub fn body(bounds: &Aabb) -> Self {
+        Self::inside(bounds.centre(), bounds)
+    }
+
     /// A collision in a body within `bounds`.
     #[inline]
     pub fn inside(x: DVec3, bounds: &Aabb) -> Self {

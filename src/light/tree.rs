@@ -297,8 +297,8 @@ mod tests {
         all
     }
 
-    /// Chances add up to 1 and are those of the draws, of which each leaves an even number: chi-square to 6 of its standard deviations, in
-    /// scenes of 2 to 400 lights and of any size.
+    /// Chances, with that of none, add up to 1 and are those of the draws, of which each leaves an even number: chi-square to 6 of its standard
+    /// deviations, in scenes of 2 to 400 lights and of any size. There is none only where the children of a node are ruled out and it is not.
     #[test]
     fn lights_are_drawn_by_their_chances() {
         let mut worst = 0.0_f64;
@@ -307,13 +307,17 @@ mod tests {
         {
             let tree = Tree::new(&lamps(n, centre, apart));
             for (k, from) in (0..).zip(references(centre, apart)) {
-                let chances: Vec<f64> = (0..n as usize).map(|i| tree.chance(&from, i)).collect();
+                let mut chances: Vec<f64> = (0..n as usize).map(|i| tree.chance(&from, i)).collect();
                 let sum: f64 = chances.iter().sum();
-                assert!(sum == 0.0 && n == 2 || (sum - 1.0).abs() < 1e-9, "{n} lights, {from:?}: {sum}");
+                assert!(sum < 1.0 + 1e-9 && (sum > 0.5 || n < 10), "{n} lights, {from:?}: {sum}");
+                chances.push(1.0 - sum);
                 let draws = 20_000;
-                let (mut counts, mut left) = (vec![0.0; n as usize], 0.0);
+                let (mut counts, mut left) = (vec![0.0; n as usize + 1], 0.0);
                 for i in 0..draws {
-                    let Some(pick) = tree.pick(&from, number(1_000_000 * k + i)) else { continue };
+                    let Some(pick) = tree.pick(&from, number(1_000_000 * k + i)) else {
+                        counts[n as usize] += 1.0;
+                        continue;
+                    };
                     assert!((pick.chance - chances[pick.light]).abs() <= 1e-12 * pick.chance && pick.left < 1.0);
                     counts[pick.light] += 1.0;
                     left += pick.left;
@@ -328,14 +332,15 @@ mod tests {
                         (cells, rest) = (cells + 1.0, [0.0; 2]);
                     }
                 }
-                if sum == 0.0 || cells < 2.0 {
-                    continue;
-                }
-                let z = (square - cells) / (2.0 * cells).sqrt();
+                let z = (square - cells) / (2.0_f64 * cells).sqrt();
                 worst = worst.max(z);
                 assert!(z < 6.0, "{n} lights, {from:?}: {square} of {cells}");
-                let mean = left / draws as f64;
-                assert!((mean - 0.5).abs() < 6.0 / (12.0 * draws as f64).sqrt(), "{n} lights, {from:?}: {mean} left");
+                let drawn = draws as f64 - counts[n as usize];
+                let mean = left / drawn.max(1.0);
+                assert!(
+                    drawn < 9.0 || (mean - 0.5).abs() < 6.0 / (12.0 * drawn).sqrt(),
+                    "{n} lights, {from:?}: {mean} left"
+                );
             }
         }
         println!("worst z {worst}");

@@ -30,6 +30,8 @@ pub struct Entering {
 /// How pairs of a point of the body and a point of a light are drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Emission {
+    /// The body as a whole, for which lamps are chosen before there is a point of it.
+    pub around: Reference,
     /// Share of the pairs whose light is a sun.
     pub from_suns: f32,
     /// Shares of the three ways to draw a point of a lamp and one of the body: both by area; the body's by area, and the lamp
@@ -72,7 +74,7 @@ impl Emission {
         // Densities of the three ways over that of the second, without their shares. `pdf_angle` by the first way.
         let together = |at: &SurfacePoint, w: Vec3, pdf_angle: f32, lamp: u32| {
             let two_sided = view.scene.surface(lamp).emission.is_some_and(|e| e.two_sided);
-            let by_lamp = area * lights.pdf_by_power(lamp) * if two_sided { 0.5 } else { 1.0 };
+            let by_lamp = area * lights.pdf_point(&self.around, lamp) * if two_sided { 0.5 } else { 1.0 };
             let ways = [PI * pdf_angle / at.n.dot(w), 1.0, by_lamp];
             let by: [f32; 3] = std::array::from_fn(|i| self.ways[i] * ways[i]);
             let density = by.iter().sum::<f32>();
@@ -106,7 +108,7 @@ impl Emission {
             let flux = radiance * (weight * passed(&at, w));
             Some(Entering { at, w, flux, light: lights.number(hit.mesh), shadow: None, by })
         } else {
-            let drawn = lights.sample_by_power(view.scene, [pick as f32, u[0], u[1]])?;
+            let drawn = lights.sample(view.scene, Group::Near, &self.around, [pick as f32, u[0], u[1]])?;
             let (LightEnd::Point { at: lamp, two_sided }, Some(object)) = (drawn.end, drawn.object) else {
                 return None;
             };
