@@ -142,9 +142,10 @@ fn a_floor_has_the_light_of_all_lamps() {
     agree(mean(&scene, path, 64), radiance, 0.01, "volume_path");
     let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
     let (view, lights) = (View { scene: &scene, rays: &*rays }, Lights::new(&scene));
-    let at = scene.objects[0].mesh.point(0, 0.5, 0.5);
-    let at = SurfacePoint { n: at.n_geometric, ..at.facing(Vec3::Y) };
-    assert!((at.x + scene.centre).length() < 1e-9);
+    let point = |(u, v)| scene.objects[0].mesh.point(0, u, v).facing(Vec3::Y);
+    let middles = [(0.5, 0.5), (0.5, 0.0), (0.0, 0.5)].map(point);
+    let at = middles.into_iter().find(|at| (at.x + scene.centre).length() < 1e-9).unwrap();
+    let at = SurfacePoint { n: at.n_geometric, ..at };
     for share in [0.0, 0.4, 1.0] {
         let run = |run: u64| {
             let n = 4000;
@@ -177,9 +178,11 @@ fn a_ball_amid_many_lamps_is_that_amid_one_mesh_of_them() {
         for (orders, photons, passes) in
             [(Orders::Single, 0, 32), (Orders::Multiple, 0, 64), (Orders::Multiple, 1024, 32)]
         {
-            let [a, b] = [&many, &one]
-                .map(|scene| mean(scene, |seed| VolumePath::new(scene, paths(photons, orders, seed)).unwrap(), passes));
-            agree(a, b, 0.02, &format!("{more}volume_path, {orders:?}, {photons} photons"));
+            // Points of the one mesh are noisier.
+            let [a, b] = [(&many, passes), (&one, 3 * passes)].map(|(scene, passes)| {
+                mean(scene, |seed| VolumePath::new(scene, paths(photons, orders, seed)).unwrap(), passes)
+            });
+            agree(a, b, 0.03, &format!("{more}volume_path, {orders:?}, {photons} photons"));
         }
         let [a, b] = [&many, &one].map(|scene| {
             let options =

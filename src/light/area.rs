@@ -36,11 +36,6 @@ impl AreaLight {
         Some(Self { object, table, emission, bounds, normals, projected })
     }
 
-    /// Radiance, mean over the channels.
-    pub fn mean_radiance(&self) -> f32 {
-        self.emission.radiance.mean()
-    }
-
     /// Triangles with area.
     pub fn triangles(&self) -> usize {
         self.table.len()
@@ -55,6 +50,10 @@ impl Light for AreaLight {
     fn power(&self) -> f64 {
         let sides = if self.emission.two_sided { 2.0 } else { 1.0 };
         PI * self.table.area() * self.emission.radiance.mean_f64() * sides
+    }
+
+    fn mean_radiance(&self) -> f32 {
+        self.emission.radiance.mean()
     }
 
     fn bounds(&self) -> Option<LightBounds> {

@@ -1,6 +1,7 @@
 //! All lights of a scene: which of them is asked, and how that shares with directions that meet them by chance.
 
-use super::choice::{Choice, FEW, Pick};
+use super::choice::{Choice, FEW};
+use super::tree::Pick;
 use super::{AreaLight, Arrival, CountedLight, Light, LightSample, Met, Reference, Sky, Suns, emitted};
 use crate::geometry::SurfacePoint;
 use crate::math::{Aabb, DVec3, Rgb, Vec3};
@@ -49,9 +50,7 @@ struct Asked {
 /// What is told of some kinds of light.
 struct Facts {
     triangles: usize,
-    mean_radiance: f32,
     beside_suns: f32,
-    radiance_of_suns: f32,
     solid_angle_of_suns: f32,
 }
 
@@ -66,13 +65,9 @@ impl Lights {
         let (sky, lamps) = (Sky::new(&scene.environment), AreaLight::all(scene).collect::<Vec<_>>());
         let suns = Suns::new(&sky);
         let of_suns = |value: fn(&Suns) -> f32, none| suns.as_ref().map_or(none, value);
-        let by_power = Choice::by_power(lamps.iter().map(|lamp| lamp as &dyn Light));
-        let mean = |(i, lamp): (usize, &AreaLight)| lamp.mean_radiance() * by_power.share(i) as f32;
         let facts = Facts {
             triangles: lamps.iter().map(AreaLight::triangles).sum(),
-            mean_radiance: lamps.iter().enumerate().map(mean).sum(),
             beside_suns: of_suns(|suns| suns.beside, 1.0),
-            radiance_of_suns: of_suns(|suns| suns.mean_radiance, 0.0),
             solid_angle_of_suns: of_suns(|suns| suns.solid_angle, 0.0),
         };
         // Each kind of light has its line here.
@@ -182,19 +177,16 @@ impl Lights {
         self.facts.beside_suns
     }
 
-    /// Mean radiance of the suns, by what they send; 0 without any.
-    pub fn radiance_of_suns(&self) -> f32 {
-        self.facts.radiance_of_suns
-    }
-
     /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
     pub fn solid_angle_of_suns(&self) -> f32 {
         self.facts.solid_angle_of_suns
     }
 
-    /// Mean radiance of the area lights, by power and over the channels; 0 without any.
-    pub fn mean_radiance(&self) -> f32 {
-        self.facts.mean_radiance
+    /// Mean radiance of the lights of a group, by power; 0 without any.
+    pub fn mean_radiance(&self, group: Group) -> f32 {
+        let Asked { lights, choice } = self.group(group);
+        let weighted = |(k, &i): (usize, &u32)| self.lights[i as usize].mean_radiance() * choice.share(k) as f32;
+        lights.iter().enumerate().map(weighted).sum()
     }
 
     /// Triangles in the light table.
@@ -226,7 +218,7 @@ impl Lights {
     /// What is said of the environment in a list of parts.
     pub fn environment_text(&self) -> String {
         let share = 100.0 * (1.0 - self.share_beside_suns());
-        match self.radiance_of_suns() > 0.0 {
+        match self.facts.beside_suns < 1.0 {
             true => {
                 format!("{}; {share:.1} % of its light is from suns, which are asked for like lamps", self.sky.text())
             }
@@ -353,9 +345,8 @@ impl Lights {
     /// without, unless an emitter is nearer than it is wide: from there its points have densities that differ without
     /// bound.
     pub fn cosine_share(&self, bounds: Aabb) -> f32 {
-        let near = &self.group(Group::Near).lights;
         if self.has_environment() {
-            return if near.is_empty() { 1.0 } else { 0.5 };
+            return if self.asked_beside_sky().next().is_none() { 1.0 } else { 0.5 };
         }
         let seen = |&i: &u32| {
             let light = &self.lights[i as usize];
@@ -363,7 +354,7 @@ impl Lights {
             let area = light.area() as f32;
             if area > 0.0 { area / (area + PI * gap * gap) } else { 0.0 }
         };
-        let largest = near.iter().map(seen).fold(0.0, f32::max);
+        let largest = self.group(Group::Near).lights.iter().map(seen).fold(0.0, f32::max);
         if largest > NEAR { 0.5 * largest } else { 0.0 }
     }
 

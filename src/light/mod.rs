@@ -17,10 +17,11 @@ use crate::query::{Hit, Ray};
 use crate::scene::{Emission, Scene};
 pub use area::AreaLight;
 pub use bounds::{Cone, LightBounds};
-pub use choice::{Choice, Pick};
+pub use choice::Choice;
 pub use lights::{Group, Lights};
 pub use sky::Sky;
 pub use suns::Suns;
+pub use tree::Pick;
 
 /// One light. Which of them is asked is the choice of [`Lights`].
 pub trait Light: Send + Sync {
@@ -30,6 +31,9 @@ pub trait Light: Send + Sync {
     /// What it sends, mean over the channels: flux [radiance unit x sr x unit²] of a light at a place, irradiance across its
     /// direction [radiance unit x sr] of one far away.
     fn power(&self) -> f64;
+
+    /// Its radiance, mean over the channels and by what it sends. A delta light has that of one that would send the same and be no trouble to meet.
+    fn mean_radiance(&self) -> f32;
 
     /// Where it is and into which directions it shines; `None` of a light far away.
     fn bounds(&self) -> Option<LightBounds>;

@@ -78,7 +78,11 @@ impl Light for Sky {
     }
 
     fn power(&self) -> f64 {
-        self.radiance.mean_f64() * self.picture.as_ref().map_or(1.0, |picture| picture.mean) * f64::from(PI)
+        f64::from(self.mean_radiance() * PI)
+    }
+
+    fn mean_radiance(&self) -> f32 {
+        self.radiance.mean() * self.picture.as_ref().map_or(1.0, |picture| picture.mean) as f32
     }
 
     fn bounds(&self) -> Option<LightBounds> {

@@ -28,8 +28,8 @@ pub struct Suns {
     power: f64,
     /// Share of the picture's light that comes from elsewhere.
     pub beside: f32,
-    /// Mean radiance by what they send.
-    pub mean_radiance: f32,
+    /// By what they send.
+    mean_radiance: f32,
     /// Of an even light with the same power and the same square of radiance [sr].
     pub solid_angle: f32,
 }
@@ -97,6 +97,10 @@ impl Light for Suns {
 
     fn power(&self) -> f64 {
         self.power * self.scale.mean_f64()
+    }
+
+    fn mean_radiance(&self) -> f32 {
+        self.mean_radiance
     }
 
     fn bounds(&self) -> Option<LightBounds> {

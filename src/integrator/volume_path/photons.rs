@@ -7,7 +7,7 @@ use super::emission::{Emission, Entering};
 use super::spectrum::Spectrum;
 use crate::geometry::AreaTable;
 use crate::integrator::View;
-use crate::light::{Lights, Reference};
+use crate::light::{Group, Lights, Reference};
 use crate::math::{DVec3, Vec3, hash_combine};
 use crate::optics::refract;
 use crate::sampling::{CacheStream, Points, Turn};
@@ -102,7 +102,8 @@ impl Source {
         };
         // Radiance that brings the flux: of two kinds of light the mean of what each alone would have.
         let per = |flux: f32, radiance: f32| if flux > 0.0 { flux / (radiance * self.count as f32) } else { 0.0 };
-        let per_photon = per(from_lamps, lights.mean_radiance()) + per(from_suns, lights.radiance_of_suns());
+        let per_photon =
+            per(from_lamps, lights.mean_radiance(Group::Near)) + per(from_suns, lights.mean_radiance(Group::Far));
         let yielding = YIELD * per_photon / (4.0 * PI * body.eta * body.eta);
         let emission = Emission { around, from_suns: sunny, ways };
         (yielding.is_normal()).then_some(Plan { emission, yielding })
