@@ -12,6 +12,15 @@ pub fn either<'a, N: PartialEq + From<u8>>(n: N, one: &'a str, many: &'a str) ->
     if n == N::from(1) { one } else { many }
 }
 
+/// The first `most` of a list, and how many more there are.
+pub fn first_of(list: &[String], most: usize) -> String {
+    let shown = list[..list.len().min(most)].join(", ");
+    match list.len().saturating_sub(most) {
+        0 => shown,
+        more => format!("{shown} and {more} more"),
+    }
+}
+
 /// Four significant digits, and no more zeros than it takes.
 pub fn short(v: f64) -> String {
     digits(v, 4)
@@ -71,6 +80,13 @@ mod tests {
         assert_eq!([edges(0), edges(1), edges(2), edges(11)], ["0 edges", "1 edge", "2 edges", "11 edges"]);
         assert_eq!(counted(1_u64, "edge belongs", "edges belong"), "1 edge belongs");
         assert_eq!((either(1_u32, "has", "have"), either(21_u32, "has", "have")), ("has", "have"));
+    }
+
+    #[test]
+    fn long_lists_are_cut_and_say_so() {
+        let names = ["a", "b", "c"].map(String::from);
+        let cut = [0, 1, 2, 3].map(|most| first_of(&names, most));
+        assert_eq!(cut, [" and 3 more", "a and 2 more", "a, b and 1 more", "a, b, c"]);
     }
 
     #[test]

@@ -6,7 +6,7 @@ mod rendering;
 use marmor::ErrorKind;
 use marmor::film::{Image, Metadata, PngOptions, Window, save};
 use marmor::integrator::{Direct, Integrator, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
-use marmor::light::Sky;
+use marmor::light::{Light, Sky};
 use marmor::math::{DVec3, Rgb, Vec3};
 use marmor::scene::{EntrySampling, Estimator, Orders, Scene, SceneFile, Spread};
 use rendering::{Within, channels, film, load, load_in, mean_of};

@@ -4,7 +4,7 @@
 
 use marmor::geometry::Precision;
 use marmor::integrator::{View, VolumePath, VolumePathOptions};
-use marmor::light::Lights;
+use marmor::light::{Group, Lights};
 use marmor::math::{Vec3, hash, unit_f32};
 use marmor::query::{self, Backend, Ray};
 use marmor::scene::{Orders, Scene};
@@ -306,7 +306,7 @@ fn a_small_lamp_in_the_middle_of_a_wide_scene_does_not_shade_itself() {
                 let u = |k: u64| unit_f32((hash(5 * i + k + 1) >> 32) as u32);
                 let at = scene.objects[0].mesh.point((i % 2) as u32, u(0).into(), (u(1) * (1.0 - u(0))).into());
                 let at = at.facing(Vec3::Y);
-                let Some(arrival) = lights.sample_emitter(&scene, &at, [u(2), u(3), u(4)]) else { continue };
+                let Some(arrival) = lights.arrival(&scene, Group::Near, &at, [u(2), u(3), u(4)]) else { continue };
                 asked += 1;
                 assert!(!rays.occluded(&arrival.shadow), "{precision:?} on {}: {:?}", backend.name(), arrival.shadow);
             }

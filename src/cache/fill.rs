@@ -3,7 +3,7 @@
 use super::{Cache, CachedSample, Density};
 use crate::bssrdf::{Bssrdf, Entry};
 use crate::geometry::{AreaTable, SurfacePoint};
-use crate::light::{Arrival, Lights, emitted};
+use crate::light::{Arrival, Lights, Met};
 use crate::math::{Rgb, Vec3};
 use crate::optics::{refract, transmittance};
 use crate::query::Ray;
@@ -164,35 +164,11 @@ impl Filler<'_> {
         }
     }
 
-    /// One arrival, and whether the way to the light is known to be open. Where some directions are picked by the lights
-    /// and some by the cosine or the environment, each counts over the density of both [Vea97], the balance heuristic.
+    /// One arrival, and whether the way to the light is known to be open.
     fn arrival(&self, at: &SurfacePoint, u: [f32; 4], tally: &mut Tally) -> Option<(Arrival, bool)> {
-        let share = self.cosine_share();
-        if !self.lights.has_emitters() {
-            return if self.lights.has_environment() {
-                Some((self.lights.sample_environment(at, [u[1], u[2]])?, false))
-            } else {
-                None
-            };
-        }
-        if u[3] >= share {
-            let mut arrival = self.lights.sample_emitter(self.view.scene, at, [u[0], u[1], u[2]])?;
-            arrival.irradiance *=
-                1.0 / ((1.0 - share) + share * self.lights.pdf_around(at, arrival.w) / arrival.pdf_angle);
-            return Some((arrival, false));
-        }
-        let (w, ray) = self.lights.look_around(at, [u[1], u[2]])?;
-        tally.rays.bounce += 1;
-        let (radiance, by_light, light) = match self.view.rays.closest(&ray) {
-            Some(hit) => {
-                let (pdf, light) = (self.lights.pdf_angle(self.view.scene, &hit, w), self.lights.number(hit.mesh));
-                (emitted(self.view.scene, &hit, w), pdf, light)
-            }
-            None => (self.lights.environment(w), 0.0, self.lights.number_of_sun(w)),
-        };
-        let pdf_angle = share * self.lights.pdf_around(at, w) + (1.0 - share) * by_light;
-        let irradiance = radiance * (at.n.dot(w) / pdf_angle);
-        Some((Arrival { w, irradiance, pdf_angle, shadow: ray, light }, true))
+        let (arrival, open) = self.lights.arrival_of_all(self.view, at, self.cosine_share(), u)?;
+        tally.rays.bounce += u64::from(open);
+        Some((arrival, open))
     }
 
     /// Cosine-sampled directions, followed to whatever shines there.
@@ -202,10 +178,7 @@ impl Filler<'_> {
             let (at, weight, u) = self.point(number);
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { continue };
             tally.rays.bounce += 1;
-            let (radiance, light) = match self.view.rays.closest(&ray) {
-                Some(hit) => (emitted(self.view.scene, &hit, w), self.lights.number(hit.mesh)),
-                None => (self.lights.environment(w), self.lights.number_of_sun(w)),
-            };
+            let Met { radiance, light } = self.lights.met(self.view.scene, self.view.rays.closest(&ray).as_ref(), w);
             if !radiance.is_black() {
                 if let Some(light) = light {
                     tally.rays.lights.meet(light);

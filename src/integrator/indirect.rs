@@ -253,8 +253,7 @@ impl Round<'_> {
         let object = plan.body.object as usize;
         let key = hash_combine(self.key(plan, 3), level.into());
         let wanted = f64::from(self.of.count) * (flux(&source) / whole).min(1.0);
-        // Written so that what is not a number is none.
-        if !(wanted > 0.0) {
+        if wanted.is_nan() || wanted <= 0.0 {
             return;
         }
         let (count, chance) = if wanted >= FEWEST { (wanted, 1.0) } else { (FEWEST, wanted / FEWEST) };
@@ -307,7 +306,7 @@ impl Round<'_> {
     /// Follows light along `ray` until nothing is left of it.
     fn follow(&self, mut ray: Ray, mut flux: Rgb, mut draws: Draws, found: &mut Found) {
         for _ in 0..self.of.bounces {
-            if !(flux.max() > 0.0) {
+            if !flux.is_finite() || flux.is_black() {
                 return;
             }
             found.tally.rays.bounce += 1;

@@ -44,9 +44,9 @@ impl DirectLight {
         };
         for part in 0..self.samples {
             let mut numbers = stream.split(part, self.samples);
-            if self.lights.has_emitters() {
+            for group in self.lights.asked_beside_sky() {
                 let [u, v] = numbers.next_2d();
-                if let Some(arrival) = self.lights.sample_emitter(view.scene, at, [numbers.next_1d(), u, v]) {
+                if let Some(arrival) = self.lights.arrival(view.scene, group, at, [numbers.next_1d(), u, v]) {
                     add(arrival);
                 }
             }
@@ -66,7 +66,7 @@ impl DirectLight {
             let (n, t) = (self.lights.emitters(), self.lights.triangles());
             Part::built("light table", {
                 let (t, n) = (counted(t, "emitting triangle", "emitting triangles"), counted(n, "mesh", "meshes"));
-                format!("{t} of {n}, picked by power and area")
+                format!("{t} of {n}, {}", self.lights.choice_text())
             })
         } else {
             Part::left_out("light table", "no emissive surface with area")

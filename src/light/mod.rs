@@ -1,17 +1,182 @@
-//! Light arriving at a surface point, before anything stands in its way.
-//! Not for: what the surface does with it (`integrator`, `cache`). Read first: [`Lights`].
+//! Light arriving at a surface point or at a collision, before anything stands in its way.
+//! Not for: what the surface does with it (`integrator`, `cache`). Read first: [`Lights`], which is what callers ask; then
+//! [`Light`], one kind of light and one file each: `area.rs`, `suns.rs`, `sky.rs`.
 
-mod emitters;
+mod area;
+mod bounds;
+mod choice;
+mod lights;
 mod picture;
 mod sky;
 mod suns;
+mod tree;
 
 use crate::geometry::SurfacePoint;
-use crate::math::{Rgb, Vec3};
+use crate::math::{Aabb, DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::scene::{Emission, Scene};
-pub use emitters::Lights;
-pub use sky::{Sky, SunDirection};
+pub use area::AreaLight;
+pub use bounds::{Cone, LightBounds};
+pub use choice::Choice;
+pub use lights::{Group, Lights};
+pub use sky::Sky;
+pub use suns::Suns;
+pub use tree::Pick;
+
+/// One light. Which of them is asked is the choice of [`Lights`].
+pub trait Light: Send + Sync {
+    /// What the user calls it.
+    fn name(&self, scene: &Scene) -> String;
+
+    /// What it sends, mean over the channels: flux [radiance unit x sr x unit²] of a light at a place, irradiance across its
+    /// direction [radiance unit x sr] of one far away.
+    fn power(&self) -> f64;
+
+    /// Its radiance, mean over the channels and by what it sends. A delta light has that of one that would send the same and be no trouble to meet.
+    fn mean_radiance(&self) -> f32;
+
+    /// Where it is and into which directions it shines; `None` of a light far away.
+    fn bounds(&self) -> Option<LightBounds>;
+
+    /// The object whose surface it is.
+    fn object(&self) -> Option<u32> {
+        None
+    }
+
+    /// Area of its surface [unit²]; 0 without one.
+    fn area(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether it is a single place or direction: no ray meets it by chance.
+    fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// A point of it, or a direction to it, with its own density. `pick` and `u` in [0, 1), three numbers.
+    fn sample(&self, scene: &Scene, from: &Reference, pick: f64, u: [f32; 2]) -> Option<LightSample>;
+
+    /// Density by [`Self::sample`] of a point of it that was met [1/unit²], or, far away, of the unit direction `w` [1/sr]; 0
+    /// where it is not.
+    fn pdf(&self, from: &Reference, w: Vec3) -> f64;
+
+    /// Radiance that a ray along `w` meets that leaves the scene; of suns none, for the sky's picture has theirs.
+    fn radiance(&self, _w: Vec3) -> Rgb {
+        Rgb::BLACK
+    }
+}
+
+/// Where light is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Reference {
+    /// The place.
+    pub x: DVec3,
+    /// Unit normal of a surface that takes light from above it alone; `None` in a medium.
+    pub n: Option<Vec3>,
+    /// Light leaves lamps for places within this distance [unit]: of a collision, to which light is refracted somewhere on its body;
+    /// 0 on a surface.
+    pub reach: f32,
+}
+
+impl Reference {
+    /// A point of a surface.
+    #[inline]
+    pub fn surface(at: &SurfacePoint) -> Self {
+        Self { x: at.x, n: Some(at.n), reach: 0.0 }
+    }
+
+    /// A body within `bounds`, no place of it in particular.
+    pub fn body(bounds: &Aabb) -> Self {
+        Self::inside(bounds.centre(), bounds)
+    }
+
+    /// A collision in a body within `bounds`.
+    #[inline]
+    pub fn inside(x: DVec3, bounds: &Aabb) -> Self {
+        let farthest = (bounds.lower - x).abs().max((bounds.upper - x).abs());
+        Self { x, n: None, reach: farthest.length() as f32 }
+    }
+}
+
+/// A point of a light, or a direction to it, that was drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Which.
+    pub end: LightEnd,
+    /// Radiance from there; of a delta light intensity [radiance unit x unit²] or irradiance [radiance unit x sr].
+    pub radiance: Rgb,
+    /// Density of points [1/unit²] or of directions [1/sr]; of a delta light the chance that it is asked.
+    pub pdf: f64,
+    /// Whether the light is one of [`Light::is_delta`].
+    pub is_delta: bool,
+    /// The object whose surface it is.
+    pub object: Option<u32>,
+    /// The number of the light in the tally: see [`Lights::counted`].
+    pub light: usize,
+}
+
+/// Where light comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum LightEnd {
+    /// A point of a surface; it shines to where its normal looks, or to both sides.
+    Point {
+        /// The point.
+        at: SurfacePoint,
+        /// Whether it shines to both sides.
+        two_sided: bool,
+    },
+    /// A unit direction, far away.
+    Direction(Vec3),
+}
+
+impl LightSample {
+    /// Cosine at the light for what is seen along the unit vector `w`, from there to the light; not above 0 where it is dark,
+    /// 1 of what has no area.
+    #[inline]
+    pub fn cosine(&self, w: Vec3) -> f32 {
+        match self.end {
+            LightEnd::Point { at, two_sided } if !self.is_delta => {
+                let cosine = -at.n_geometric.dot(w);
+                if two_sided { cosine.abs() } else { cosine }
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// Its light on a surface; `None` where it comes from behind the surface or leaves the light at its dark side.
+    pub fn arrival(&self, at: &SurfacePoint) -> Option<Arrival> {
+        let above = |w: Vec3| (at.n.dot(w) > 0.0 && at.n_geometric.dot(w) > 0.0).then_some(w);
+        let (w, factor, pdf_angle) = match self.end {
+            LightEnd::Point { at: light, .. } => {
+                let to_light = (light.x - at.x).as_vec3();
+                let distance = to_light.length();
+                if distance <= 0.0 {
+                    return None;
+                }
+                let w = above(to_light / distance)?;
+                // Divided one length at a time: distance² leaves the range of f32 long before the quotient does.
+                let per_pdf = self.cosine(w) / distance / distance / self.pdf as f32;
+                (w, at.n.dot(w) * per_pdf, 1.0 / per_pdf)
+            }
+            LightEnd::Direction(w) => (above(w)?, at.n.dot(w) / self.pdf as f32, self.pdf as f32),
+        };
+        if factor <= 0.0 {
+            return None;
+        }
+        let pdf_angle = if self.is_delta { f32::INFINITY } else { pdf_angle };
+        let (irradiance, shadow) = (self.radiance * factor, self.shadow(at, w));
+        Some(Arrival { w, irradiance, pdf_angle, shadow, light: Some(self.light) })
+    }
+
+    /// From a surface, which light leaves against the unit vector `w`, to the light.
+    #[inline]
+    pub fn shadow(&self, at: &SurfacePoint, w: Vec3) -> Ray {
+        match &self.end {
+            LightEnd::Point { at: light, .. } => Ray::between(at.leave(w), light.arrive(w, at.x, at.error)),
+            LightEnd::Direction(to) => Ray::new(at.leave(w), *to),
+        }
+    }
+}
 
 /// One sampled direction from which light may arrive.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +186,7 @@ pub struct Arrival {
     /// L_i cosθ_i / pdf: this sample's estimate of irradiance if nothing stands in the way
     /// [radiance unit x sr].
     pub irradiance: Rgb,
-    /// Chance of `w` per solid angle [1/sr].
+    /// Density of `w` [1/sr]; infinite of a delta light.
     pub pdf_angle: f32,
     /// Light arrives if nothing is hit on this ray.
     pub shadow: Ray,
@@ -29,41 +194,32 @@ pub struct Arrival {
     pub light: Option<usize>,
 }
 
-/// A light of which it is counted how often it was asked for.
+impl Arrival {
+    /// Its share by the balance heuristic [VG95] beside directions of the density `other` [1/sr].
+    #[inline]
+    pub fn share_beside(&self, other: f32) -> f32 {
+        1.0 / (1.0 + other / self.pdf_angle)
+    }
+}
+
+/// What a ray meets.
+#[derive(Clone, Copy, Debug)]
+pub struct Met {
+    /// Radiance from there.
+    pub radiance: Rgb,
+    /// The number of the light, where it is one that is counted.
+    pub light: Option<usize>,
+}
+
+/// Lights of which it is counted how often they were asked for.
 #[derive(Clone, Debug)]
 pub struct CountedLight {
-    /// Its number in the tally.
+    /// Their number in the tally.
     pub number: usize,
-    /// What the user calls it.
+    /// What the user calls them.
     pub name: String,
-    /// Chance that it is the one that is asked for.
+    /// Chance by power that one of them is asked for.
     pub chance: f64,
-}
-
-/// A point of an area light.
-#[derive(Clone, Copy, Debug)]
-pub struct LampPoint {
-    /// The point.
-    pub at: SurfacePoint,
-    /// Index of the object.
-    pub object: u32,
-    /// What it sends into every direction that it shines to.
-    pub radiance: Rgb,
-    /// Whether it shines to both sides.
-    pub two_sided: bool,
-    /// Chance of the point per area [1/unit²].
-    pub pdf_area: f32,
-    /// The number of the light.
-    pub light: usize,
-}
-
-impl LampPoint {
-    /// Cosine at the lamp for light that is seen along the unit vector `w`, from there to the lamp; not above 0 where it is dark.
-    #[inline]
-    pub fn cosine(&self, w: Vec3) -> f32 {
-        let cosine = -self.at.n_geometric.dot(w);
-        if self.two_sided { cosine.abs() } else { cosine }
-    }
 }
 
 /// Radiance that the surface at `hit` sends back along a ray with direction `towards` of its own, by emission.

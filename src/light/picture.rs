@@ -20,6 +20,8 @@ pub(super) struct Picture {
     columns: Vec<f32>,
     /// Cosines of the angles from +y between the rows.
     cosines: Vec<f64>,
+    /// Over all directions and the channels.
+    pub(super) mean: f64,
 }
 
 impl Picture {
@@ -39,6 +41,7 @@ impl Picture {
             rows: Vec::with_capacity(height + 1),
             columns: Vec::with_capacity((height + 1) * width),
             cosines,
+            mean: 0.0,
         };
         let mut total = 0.0;
         for k in 0..=height {
@@ -58,6 +61,8 @@ impl Picture {
         for row in &mut picture.rows {
             *row /= total;
         }
+        // Of four corners each, and of 2π / width for each cosine.
+        picture.mean = total / (8.0 * width as f64);
         picture
     }
 

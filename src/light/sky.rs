@@ -1,28 +1,17 @@
 //! The environment: the same radiance all around, or a picture of all directions with a table of where it shines.
 
 use super::picture::Picture;
-use super::suns::Suns;
+use super::{Light, LightBounds, LightEnd, LightSample, Reference};
 use crate::math::{Rgb, Vec3};
 use crate::sampling::cosine_hemisphere;
-use crate::scene::Environment;
+use crate::scene::{Environment, Scene};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
-/// Light from every direction that meets no surface.
+/// Light from every direction that meets no surface. What is found by the directions of a surface needs no choice among lights.
 pub struct Sky {
     radiance: Rgb,
-    picture: Option<Picture>,
-    suns: Option<Suns>,
-}
-
-/// A direction of the bright part of a picture.
-#[derive(Clone, Copy, Debug)]
-pub struct SunDirection {
-    /// Unit direction towards the light.
-    pub w: Vec3,
-    /// Radiance from there.
-    pub radiance: Rgb,
-    /// Chance per solid angle [1/sr].
-    pub pdf_angle: f32,
+    picture: Option<Arc<Picture>>,
 }
 
 /// Share of the directions that are picked by where a picture shines; the rest by the cosine, so that a picture's dark half,
@@ -34,47 +23,8 @@ impl Sky {
     pub fn new(environment: &Environment) -> Self {
         let picture = environment.image.clone().map(|image| Picture::new(image, environment.turn));
         let dark = environment.is_black() || picture.as_ref().is_some_and(Picture::is_black);
-        let picture = picture.filter(|_| !dark);
-        let suns = picture.as_ref().and_then(Suns::new);
-        Self { radiance: if dark { Rgb::BLACK } else { environment.radiance }, picture, suns }
-    }
-
-    /// Whether a picture has parts so much brighter than its mean that paths should not wait for them.
-    pub fn has_suns(&self) -> bool {
-        self.suns.is_some()
-    }
-
-    /// Share of all its light that does not come from suns; 1 without any.
-    pub fn share_beside_suns(&self) -> f32 {
-        self.suns.as_ref().map_or(1.0, |suns| suns.beside)
-    }
-
-    /// Mean radiance of the suns, by what they send; 0 without any.
-    pub fn radiance_of_suns(&self) -> f32 {
-        self.suns.as_ref().map_or(0.0, |suns| suns.radiance * self.radiance.mean())
-    }
-
-    /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
-    pub fn solid_angle_of_suns(&self) -> f32 {
-        self.suns.as_ref().map_or(0.0, |suns| suns.solid_angle)
-    }
-
-    /// A direction of the suns, by what they send.
-    pub fn sun(&self, u: [f32; 3]) -> Option<SunDirection> {
-        let (picture, suns) = (self.picture.as_ref()?, self.suns.as_ref()?);
-        let w = suns.sample(picture, u);
-        // A direction within rounding of its patch's edge may be found in the next.
-        let pdf_angle = suns.pdf(picture, w);
-        (pdf_angle > 0.0).then(|| SunDirection { w, radiance: self.radiance(w), pdf_angle })
-    }
-
-    /// Chance per solid angle [1/sr] of the unit vector `w` by [`Self::sun`]; 0 where no sun is.
-    #[inline]
-    pub fn pdf_sun(&self, w: Vec3) -> f32 {
-        match (&self.picture, &self.suns) {
-            (Some(picture), Some(suns)) => suns.pdf(picture, w),
-            _ => 0.0,
-        }
+        let picture = picture.filter(|_| !dark).map(Arc::new);
+        Self { radiance: if dark { Rgb::BLACK } else { environment.radiance }, picture }
     }
 
     /// Whether no light comes from it.
@@ -82,18 +32,14 @@ impl Sky {
         self.radiance.is_black()
     }
 
-    /// Radiance out of the direction of the unit vector `w`.
-    #[inline]
-    pub fn radiance(&self, w: Vec3) -> Rgb {
-        match &self.picture {
-            None => self.radiance,
-            Some(picture) => self.radiance * picture.at(w),
-        }
+    /// Its picture, and what each value of that stands for.
+    pub(super) fn picture(&self) -> Option<(&Arc<Picture>, Rgb)> {
+        Some((self.picture.as_ref()?, self.radiance))
     }
 
     /// A direction by the cosine about the unit vector `n`; under a picture, half of them by its light instead, which may
     /// lie below the horizon.
-    pub fn sample(&self, n: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+    pub fn direction(&self, n: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         match &self.picture {
             None => cosine_hemisphere(n, [u, v]),
             Some(picture) if u < BY_PICTURE => picture.sample([u / BY_PICTURE, v]),
@@ -101,8 +47,8 @@ impl Sky {
         }
     }
 
-    /// Chance per solid angle [1/sr] of `w` by [`Self::sample`].
-    pub fn pdf(&self, n: Vec3, w: Vec3) -> f32 {
+    /// Density [1/sr] of `w` by [`Self::direction`].
+    pub fn density(&self, n: Vec3, w: Vec3) -> f32 {
         let cosine = n.dot(w).max(0.0) / PI;
         match &self.picture {
             None => cosine,
@@ -110,17 +56,53 @@ impl Sky {
         }
     }
 
+    /// Light from one of the directions of [`Self::direction`].
+    pub fn towards(&self, n: Vec3, u: [f32; 2]) -> LightSample {
+        let w = self.direction(n, u);
+        let (end, pdf) = (LightEnd::Direction(w), self.density(n, w).into());
+        LightSample { end, radiance: self.radiance(w), pdf, is_delta: false, object: None, light: 0 }
+    }
+
     /// What there is, in words.
     pub fn text(&self) -> String {
         match &self.picture {
             None => "constant, sampled by the cosine".into(),
-            Some(p) => {
-                let suns = self.suns.as_ref().map_or(String::new(), |suns| {
-                    let share = 100.0 * (1.0 - suns.beside);
-                    format!("; {share:.1} % of its light is from suns, which are asked for like lamps")
-                });
-                format!("{} x {} pixels, sampled by what they send and by the cosine{suns}", p.width, p.height)
-            }
+            Some(p) => format!("{} x {} pixels, sampled by what they send and by the cosine", p.width, p.height),
+        }
+    }
+}
+
+impl Light for Sky {
+    fn name(&self, _: &Scene) -> String {
+        "the environment".into()
+    }
+
+    fn power(&self) -> f64 {
+        f64::from(self.mean_radiance() * PI)
+    }
+
+    fn mean_radiance(&self) -> f32 {
+        self.radiance.mean() * self.picture.as_ref().map_or(1.0, |picture| picture.mean) as f32
+    }
+
+    fn bounds(&self) -> Option<LightBounds> {
+        None
+    }
+
+    /// `None` in a medium: paths find it by themselves.
+    fn sample(&self, _: &Scene, from: &Reference, _: f64, u: [f32; 2]) -> Option<LightSample> {
+        Some(self.towards(from.n?, u))
+    }
+
+    fn pdf(&self, from: &Reference, w: Vec3) -> f64 {
+        from.n.map_or(0.0, |n| self.density(n, w).into())
+    }
+
+    #[inline]
+    fn radiance(&self, w: Vec3) -> Rgb {
+        match &self.picture {
+            None => self.radiance,
+            Some(picture) => self.radiance * picture.at(w),
         }
     }
 }
@@ -165,7 +147,7 @@ pub(super) mod tests {
     fn a_picture_of_one_value_is_a_constant() {
         let sky = sky([6, 3], 0.1, |_, _| Rgb([0.5, 1.0, 1.5]));
         for seed in 0..100 {
-            let w = sky.sample(Vec3::Y, numbers(seed));
+            let w = sky.direction(Vec3::Y, numbers(seed));
             assert!((w.length() - 1.0).abs() < 1e-6);
             for c in 0..3 {
                 assert!((sky.radiance(w)[c] - (c + 1) as f32).abs() < 1e-6);
@@ -202,8 +184,8 @@ pub(super) mod tests {
             let count = 200_000;
             let (mut sum, mut squares, mut whole) = (0.0, 0.0, 0.0);
             for seed in 0..count {
-                let w = sky.sample(n, numbers(seed));
-                let value = f64::from(sky.radiance(w).mean() * n.dot(w).max(0.0) / sky.pdf(n, w));
+                let w = sky.direction(n, numbers(seed));
+                let value = f64::from(sky.radiance(w).mean() * n.dot(w).max(0.0) / sky.density(n, w));
                 sum += value;
                 squares += value * value;
                 // One over the density of the picture's own directions is the whole sphere.
@@ -219,20 +201,10 @@ pub(super) mod tests {
         }
     }
 
-    /// Three of the largest numbers of single precision have a sum beyond it.
-    #[test]
-    fn the_brightest_pixel_there_can_be_hides_no_other() {
-        let pixel = |x, y| Rgb::splat(if [x, y] == [40, 20] { f32::MAX } else { 0.5 });
-        let sky = sky([64, 32], 0.0, pixel);
-        assert!(!sky.is_black() && sky.has_suns());
-        let sun = sky.sun([0.5; 3]).unwrap();
-        assert!(sun.pdf_angle.is_finite() && sky.radiance(-sun.w) == Rgb::WHITE, "{sun:?}");
-    }
-
     #[test]
     fn a_black_picture_is_no_light() {
         assert!(sky([4, 2], 0.0, |_, _| Rgb::BLACK).is_black());
         let faint = sky([4, 2], 0.0, |x, y| if x + y == 0 { Rgb::splat(1e-30) } else { Rgb::BLACK });
-        assert!(!faint.is_black() && faint.pdf(Vec3::Y, Vec3::Y).is_finite());
+        assert!(!faint.is_black() && faint.density(Vec3::Y, Vec3::Y).is_finite());
     }
 }

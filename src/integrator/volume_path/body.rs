@@ -67,6 +67,8 @@ pub struct Exit {
 /// The straight flight from a collision out of a body.
 #[derive(Clone, Copy, Debug)]
 pub struct Straight {
+    /// The collision.
+    pub from: DVec3,
     /// Phase function at the collision [1/sr].
     pub phase: f32,
     /// Length inside [unit].
@@ -213,7 +215,7 @@ impl Body {
                     let cosines = [w.dot(at.n_geometric), next.dot(at.n_geometric)];
                     if cosines[1] > 0.0 {
                         spectrum.leave(&self.medium);
-                        let straight = edge.map(|phase| Straight { phase, length: t, cosines });
+                        let straight = edge.map(|phase| Straight { from, phase, length: t, cosines });
                         return Some(Exit { at, w: next, straight });
                     }
                     w = next;

@@ -6,10 +6,10 @@ use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
 use super::spectrum::Spectrum;
-use super::through::{Drawn, drawn_light, share_by_chance, sun_share_by_chance};
+use super::through::{drawn_light, share_by_chance, sun_share_by_chance};
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
-use crate::light::{Arrival, Lights, emitted};
+use crate::light::{Arrival, Reference, emitted};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
@@ -39,8 +39,8 @@ pub struct CameraPath<'a> {
     pub other: f32,
     /// Times scattered in media.
     pub order: u32,
-    /// Density [1/sr] of the present direction, where lights were asked for at the last, Lambertian surface.
-    pub by_bsdf: Option<f32>,
+    /// Density [1/sr] of the present direction, where lights were asked for at the last surface, and that place.
+    pub by_bsdf: Option<(f32, Reference)>,
     /// Whether it comes from a step in a near field, which has the light of lights that it meets next.
     pub stepped: bool,
     /// The body that was just left, and how.
@@ -113,11 +113,11 @@ impl<'a> CameraPath<'a> {
             return;
         }
         let lights = &self.method.light.lights;
-        let share = match lights.pdf_sun(w) {
+        let share = match lights.pdf_far(w) {
             by_table if by_table > 0.0 => {
                 let share = self.direct * self.share_of_sun(by_table);
-                if share > 0.0 {
-                    self.tally.rays.lights.meet(Lights::SUNS);
+                if let (true, Some(number)) = (share > 0.0, lights.number_far(w)) {
+                    self.tally.rays.lights.meet(number);
                 }
                 share
             }
@@ -130,7 +130,7 @@ impl<'a> CameraPath<'a> {
     /// for before.
     fn share_of_sun(&self, by_table: f32) -> f32 {
         match (self.by_bsdf, &self.left) {
-            (Some(by_bsdf), _) => by_bsdf / (by_bsdf + by_table),
+            (Some((by_bsdf, _)), _) => by_bsdf / (by_bsdf + by_table),
             (None, Some((body, Some(straight)))) => {
                 sun_share_by_chance((body, self.method.through(body)), straight, by_table)
             }
@@ -151,8 +151,8 @@ impl<'a> CameraPath<'a> {
     /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision or the Lambertian
     /// surface before.
     fn share(&self, hit: &Hit, direction: Vec3) -> f32 {
-        if let Some(by_bsdf) = self.by_bsdf {
-            return by_bsdf / (by_bsdf + self.method.light.lights.pdf_angle(self.view.scene, hit, direction));
+        if let Some((by_bsdf, from)) = &self.by_bsdf {
+            return by_bsdf / (by_bsdf + self.method.light.lights.pdf_met(self.view.scene, from, hit, direction));
         }
         let Some((body, straight)) = &self.left else { return 1.0 };
         let Some(straight) = straight else {
@@ -235,17 +235,12 @@ impl<'a> CameraPath<'a> {
             return None;
         }
         let lights = &self.method.light.lights;
-        for (there, suns) in [(lights.has_emitters(), false), (lights.has_suns(), true)] {
-            if !there || bsdf.is_delta() {
-                continue;
-            }
+        for group in lights.asked().filter(|_| !bsdf.is_delta()) {
             let u = [self.draws.number(), self.draws.number(), self.draws.number()];
-            let found = if suns { lights.sample_sun(at, u) } else { lights.sample_emitter(self.view.scene, at, u) };
-            if let Some(arrival) = found
+            if let Some(arrival) = lights.arrival(self.view.scene, group, at, u)
                 && self.open(&arrival)
             {
-                // The balance heuristic [VG95] with the direction in which the path goes on.
-                let share = 1.0 / (1.0 + bsdf.pdf(at, wo, arrival.w) / arrival.pdf_angle);
+                let share = arrival.share_beside(bsdf.pdf(at, wo, arrival.w));
                 let light = bsdf.eval(at, wo, arrival.w) * arrival.irradiance * (share * self.other);
                 self.add(self.spectrum.value_outside() * light);
             }
@@ -259,7 +254,7 @@ impl<'a> CameraPath<'a> {
         let [u, v] = self.draws.pair();
         let next = bsdf.sample(at, wo, [u, v, 0.0])?;
         self.spectrum.scale(next.weight);
-        self.by_bsdf = (!bsdf.is_delta()).then_some(next.pdf);
+        self.by_bsdf = (!bsdf.is_delta()).then(|| (next.pdf, Reference::surface(at)));
         (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
@@ -318,11 +313,9 @@ impl Watch for Gather<'_, '_> {
         if let Some(through) = path.method.through(body).filter(|_| orders.contains(path.order)) {
             let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut *path.tally);
             let lights = &path.method.light.lights;
-            for (drawn, there) in [(Drawn::Lamps, lights.has_emitters()), (Drawn::Suns, lights.has_suns())] {
-                if there {
-                    let from = ((body, through), lights, drawn);
-                    path.radiance += drawn_light(path.view, from, (x, w), spectrum, found, coins, tally) * path.direct;
-                }
+            for group in lights.asked() {
+                let from = ((body, through), lights, group);
+                path.radiance += drawn_light(path.view, from, (x, w), spectrum, found, coins, tally) * path.direct;
             }
             if path.method.points_are_all(body) {
                 return false;

@@ -3,6 +3,8 @@
 use crate::light::Lights;
 use crate::optics::Medium;
 use crate::scene::{Object, Scene, Surface};
+use crate::words::first_of;
+use std::collections::HashSet;
 use std::f64::consts::PI;
 
 /// A body is clear where more than exp(-3) = 5 % of the light in some channel goes straight through its thickness.
@@ -12,12 +14,15 @@ const SMALL: f64 = 0.01;
 /// A picture's suns matter from this share of its light.
 const SUNNY: f32 = 0.01;
 
+/// Lights and bodies that are named in one sentence.
+const MOST_NAMES: usize = 8;
+
 /// What is to say of a scene before it is rendered; `None` where there is no such light.
 pub fn warning(scene: &Scene, lights: &Lights) -> Option<String> {
-    let mut kept = [Vec::new(), Vec::new()];
+    let (mut kept, mut known) = ([Vec::new(), Vec::new()], [HashSet::new(), HashSet::new()]);
     let mut keep = |list: usize, name: &str| {
         let name = format!("{name:?}");
-        if !kept[list].contains(&name) {
+        if known[list].insert(name.clone()) {
             kept[list].push(name);
         }
     };
@@ -38,7 +43,7 @@ pub fn warning(scene: &Scene, lights: &Lights) -> Option<String> {
             keep(1, &body.name);
         }
     }
-    let [from, through] = kept.map(|names| names.join(", "));
+    let [from, through] = kept.map(|names| first_of(&names, MOST_NAMES));
     (!from.is_empty()).then(|| {
         format!(
             "light of {from} that comes through {through} to diffuse surfaces or other bodies is met by chance alone, so seldom that \

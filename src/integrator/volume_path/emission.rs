@@ -3,7 +3,7 @@
 use super::body::Body;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::integrator::View;
-use crate::light::{Lights, emitted};
+use crate::light::{Arrival, Group, LightEnd, Lights, Reference, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::optics::transmittance;
 use crate::query::Ray;
@@ -30,6 +30,8 @@ pub struct Entering {
 /// How pairs of a point of the body and a point of a light are drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Emission {
+    /// The body as a whole, for which lamps are chosen before there is a point of it.
+    pub around: Reference,
     /// Share of the pairs whose light is a sun.
     pub from_suns: f32,
     /// Shares of the three ways to draw a point of a lamp and one of the body: both by area; the body's by area, and the lamp
@@ -60,30 +62,38 @@ impl Emission {
         };
         let area = table.area() as f32;
         let passed = |at: &SurfacePoint, w: Vec3| transmittance(body.eta, w.dot(at.n)) * area;
-        // The number that picks suns or lamps, spread out again, picks one of them.
+        // The number that picks what is far or near, spread out again, picks one of them.
         if u[2] < self.from_suns {
             let at = on_body();
-            let sun = lights.sample_sun(&at, [u[2] / self.from_suns, u[3], u[4]])?;
+            let sun = lights.arrival(view.scene, Group::Far, &at, [u[2] / self.from_suns, u[3], u[4]])?;
             let flux = sun.irradiance * (passed(&at, sun.w) / self.from_suns);
             return Some(Entering { at, w: sun.w, flux, light: sun.light, shadow: Some(sun.shadow), by: [0.0; 3] });
         }
         let lamps = 1.0 - self.from_suns;
         let pick_way = (u[2] - self.from_suns) / lamps;
-        // Densities of the three ways over that of the second, without their shares.
-        let together = |at: &SurfacePoint, w: Vec3, (pdf_angle, pdf_area, two_sided): (f32, f32, bool)| {
-            let ways = [PI * pdf_angle / at.n.dot(w), 1.0, area * pdf_area * if two_sided { 0.5 } else { 1.0 }];
+        // Densities of the three ways over that of the second, without their shares. `pdf_angle` by the first way.
+        let together = |at: &SurfacePoint, w: Vec3, pdf_angle: f32, lamp: u32| {
+            let two_sided = view.scene.surface(lamp).emission.is_some_and(|e| e.two_sided);
+            let by_lamp = area * lights.pdf_point(&self.around, lamp) * if two_sided { 0.5 } else { 1.0 };
+            let ways = [PI * pdf_angle / at.n.dot(w), 1.0, by_lamp];
             let by: [f32; 3] = std::array::from_fn(|i| self.ways[i] * ways[i]);
             let density = by.iter().sum::<f32>();
             (by.map(|d| d / density), PI / density / lamps)
         };
-        let two_sided = |object: u32| view.scene.surface(object).emission.is_some_and(|e| e.two_sided);
         if pick_way < self.ways[0] {
             let at = on_body();
-            let lamp = lights.point(view.scene, [pick_way / self.ways[0], u[3], u[4]])?;
-            let arrival = Lights::from_point(&lamp, &at)?;
-            let (by, weight) = together(&at, arrival.w, (arrival.pdf_angle, lamp.pdf_area, lamp.two_sided));
-            let flux = lamp.radiance * (weight * passed(&at, arrival.w));
-            Some(Entering { at, w: arrival.w, flux, light: arrival.light, shadow: Some(arrival.shadow), by })
+            let numbers = [pick_way / self.ways[0], u[3], u[4]];
+            let drawn = lights.sample(view.scene, Group::Near, &Reference::surface(&at), numbers)?;
+            let Arrival { w, irradiance, pdf_angle, shadow, light } = drawn.arrival(&at)?;
+            let (by, flux) = match drawn.object {
+                Some(lamp) => {
+                    let (by, weight) = together(&at, w, pdf_angle, lamp);
+                    (by, drawn.radiance * (weight * passed(&at, w)))
+                }
+                // What no ray meets is found in no other way.
+                None => ([1.0, 0.0, 0.0], irradiance * (passed(&at, w) / (self.ways[0] * lamps))),
+            };
+            Some(Entering { at, w, flux, light, shadow: Some(shadow), by })
         } else if pick_way < self.ways[0] + self.ways[1] {
             let at = on_body();
             let (w, ray) = Lights::look_up(&at, [u[3], u[4]])?;
@@ -93,25 +103,28 @@ impl Emission {
             if radiance.is_black() {
                 return None;
             }
-            let pdf_angle = lights.pdf_angle(view.scene, &hit, w);
-            let (by, weight) = together(&at, w, (pdf_angle, lights.pdf_area(hit.mesh), two_sided(hit.mesh)));
+            let pdf_angle = lights.pdf_met(view.scene, &Reference::surface(&at), &hit, w);
+            let (by, weight) = together(&at, w, pdf_angle, hit.mesh);
             let flux = radiance * (weight * passed(&at, w));
             Some(Entering { at, w, flux, light: lights.number(hit.mesh), shadow: None, by })
         } else {
-            let lamp = lights.point(view.scene, [pick as f32, u[0], u[1]])?;
+            let drawn = lights.sample(view.scene, Group::Near, &self.around, [pick as f32, u[0], u[1]])?;
+            let (LightEnd::Point { at: lamp, two_sided }, Some(object)) = (drawn.end, drawn.object) else {
+                return None;
+            };
             let side = (pick_way - self.ways[0] - self.ways[1]) / self.ways[2];
-            let n = if lamp.two_sided && side >= 0.5 { -lamp.at.n_geometric } else { lamp.at.n_geometric };
+            let n = if two_sided && side >= 0.5 { -lamp.n_geometric } else { lamp.n_geometric };
             let out = cosine_hemisphere(n, [u[3], u[4]]);
             tally.rays.bounce += 1;
-            let hit = view.rays.closest(&Ray::new(lamp.at.leave(out), out)).filter(|hit| hit.mesh == body.object)?;
+            let hit = view.rays.closest(&Ray::new(lamp.leave(out), out)).filter(|hit| hit.mesh == body.object)?;
             let (at, w) = (flat(hit.triangle, hit.u, hit.v), -out);
             if at.n.dot(w) <= 0.0 {
                 return None;
             }
-            let pdf_angle = hit.t * lamp.pdf_area * hit.t / n.dot(out);
-            let (by, weight) = together(&at, w, (pdf_angle, lamp.pdf_area, lamp.two_sided));
-            let flux = lamp.radiance * (weight * passed(&at, w));
-            Some(Entering { at, w, flux, light: Some(lamp.light), shadow: None, by })
+            let pdf = lights.pdf_point(&Reference::surface(&at), object);
+            let (by, weight) = together(&at, w, hit.t * pdf * hit.t / n.dot(out), object);
+            let flux = drawn.radiance * (weight * passed(&at, w));
+            Some(Entering { at, w, flux, light: Some(drawn.light), shadow: None, by })
         }
     }
 }

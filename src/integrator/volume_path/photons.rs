@@ -7,7 +7,7 @@ use super::emission::{Emission, Entering};
 use super::spectrum::Spectrum;
 use crate::geometry::AreaTable;
 use crate::integrator::View;
-use crate::light::Lights;
+use crate::light::{Group, Lights, Reference};
 use crate::math::{DVec3, Vec3, hash_combine};
 use crate::optics::refract;
 use crate::sampling::{CacheStream, Points, Turn};
@@ -70,6 +70,7 @@ impl Source {
     /// taken to see each other.
     fn look(&self, view: View<'_>, body: &Body, lights: &Lights) -> Option<Plan> {
         let pilot = CacheStream::new(Points::Sobol, self.seed, 1);
+        let around = Reference::body(&view.scene.objects[body.object as usize].mesh.bounds()?);
         let flux_by = |emission: Emission| {
             let (mut flux, mut by) = (0.0, [0.0; 3]);
             for i in 0..PILOT {
@@ -83,12 +84,12 @@ impl Source {
             (flux, by)
         };
         let (from_lamps, by) = if lights.has_emitters() {
-            flux_by(Emission { from_suns: 0.0, ways: [1.0 / 3.0; 3] })
+            flux_by(Emission { around, from_suns: 0.0, ways: [1.0 / 3.0; 3] })
         } else {
             (0.0, [1.0; 3])
         };
         let from_suns =
-            if lights.has_suns() { flux_by(Emission { from_suns: 1.0, ways: [1.0 / 3.0; 3] }).0 } else { 0.0 };
+            if lights.has_suns() { flux_by(Emission { around, from_suns: 1.0, ways: [1.0 / 3.0; 3] }).0 } else { 0.0 };
         // Each way by the part of the flux that is its own under equal shares.
         let least = by.map(|flux| (flux / from_lamps.max(f32::MIN_POSITIVE)).max(LEAST_WAY));
         let ways = least.map(|share| share / least.iter().sum::<f32>());
@@ -101,9 +102,10 @@ impl Source {
         };
         // Radiance that brings the flux: of two kinds of light the mean of what each alone would have.
         let per = |flux: f32, radiance: f32| if flux > 0.0 { flux / (radiance * self.count as f32) } else { 0.0 };
-        let per_photon = per(from_lamps, lights.mean_radiance()) + per(from_suns, lights.radiance_of_suns());
+        let per_photon =
+            per(from_lamps, lights.mean_radiance(Group::Near)) + per(from_suns, lights.mean_radiance(Group::Far));
         let yielding = YIELD * per_photon / (4.0 * PI * body.eta * body.eta);
-        let emission = Emission { from_suns: sunny, ways };
+        let emission = Emission { around, from_suns: sunny, ways };
         (yielding.is_normal()).then_some(Plan { emission, yielding })
     }
 

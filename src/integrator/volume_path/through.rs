@@ -5,8 +5,8 @@ use super::draws::Draws;
 use super::facets::{Bend, Crossing, Facets, Towards};
 use super::spectrum::Spectrum;
 use crate::integrator::View;
-use crate::light::{LampPoint, Lights, SunDirection};
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::light::{Group, LightEnd, LightSample, Lights, Reference};
+use crate::math::{Aabb, DVec3, Rgb, Vec3};
 use crate::optics::transmittance;
 use crate::query::{Hit, Ray};
 use crate::scene::Scene;
@@ -16,6 +16,8 @@ use std::f32::consts::PI;
 /// What a body needs to be asked for the light of lamps and suns.
 pub struct Through {
     facets: Facets,
+    /// The body's box.
+    bounds: Aabb,
     /// For each object whether it is a lamp whose light is found from points of it alone; a path that meets it by chance,
     /// straight from a collision, carries none of it.
     alone: Vec<bool>,
@@ -43,16 +45,12 @@ impl Through {
         let bounds = mesh.bounds()?;
         // HG's largest value [1/sr].
         let phase = (1.0 + g.abs()) / (4.0 * PI * (1.0 - g.abs()).powi(2));
-        let is_alone = |lamp: u32| {
-            let gap = scene.objects[lamp as usize].mesh.bounds().map_or(0.0, |lamp| lamp.distance(&bounds) as f32);
-            // The focus of a flat boundary seen from behind it is at most 1/(η L)² times the cosine's ratio.
-            phase / lights.pdf_area(lamp) < ALONE_BELOW * gap * gap * (eta * eta).min(1.0)
-        };
-        let is_lamp = |i: u32| lights.pdf_area(i) > 0.0;
-        let alone: Vec<bool> = (0..scene.objects.len() as u32).map(|i| is_lamp(i) && is_alone(i)).collect();
-        let all_alone = (0..alone.len() as u32).all(|i| alone[i as usize] || !is_lamp(i));
+        // The focus of a flat boundary seen from behind it is at most 1/(η L)² times the cosine's ratio.
+        let is_alone = |lamp: u32| phase < ALONE_BELOW * lights.least_solid_pdf(lamp, &bounds) * (eta * eta).min(1.0);
+        let alone: Vec<bool> = (0..scene.objects.len() as u32).map(is_alone).collect();
+        let all_alone = (0_u32..).zip(&alone).all(|(i, &alone)| alone || !lights.is_light(i));
         let alone_above = phase / (ALONE_BELOW * (eta * eta).min(1.0));
-        Some(Self { facets: Facets::new(mesh, eta)?, alone, all_alone, alone_above })
+        Some(Self { facets: Facets::new(mesh, eta)?, bounds, alone, all_alone, alone_above })
     }
 
     /// Whether light of the object number `object` is left to [`drawn_light`] alone.
@@ -64,34 +62,10 @@ impl Through {
     pub fn sun_alone(&self, pdf: f32) -> bool {
         pdf > self.alone_above
     }
-}
 
-/// What is asked for its light.
-enum Asked {
-    Lamp(LampPoint),
-    Sun(SunDirection),
-}
-
-impl Asked {
-    fn radiance(&self) -> Rgb {
-        match self {
-            Self::Lamp(lamp) => lamp.radiance,
-            Self::Sun(sun) => sun.radiance,
-        }
-    }
-
-    fn light(&self) -> usize {
-        match self {
-            Self::Lamp(lamp) => lamp.light,
-            Self::Sun(_) => Lights::SUNS,
-        }
-    }
-
-    fn place(&self) -> Towards {
-        match self {
-            Self::Lamp(lamp) => Towards::Point(lamp.at.x),
-            Self::Sun(sun) => Towards::Direction(sun.w),
-        }
+    /// The same of what was drawn.
+    fn drawn_alone(&self, drawn: &LightSample) -> bool {
+        drawn.is_delta || drawn.object.map_or_else(|| self.sun_alone(drawn.pdf as f32), |object| self.alone(object))
     }
 }
 
@@ -118,15 +92,6 @@ fn density_outside(body: &Body, bend: &Bend, phase: f32) -> f32 {
     phase * transmittance(1.0 / body.eta, bend.cosines[0] as f32) * bend.focus_of_directions(body.eta.into()) as f32
 }
 
-/// Lights whose points or directions are drawn.
-#[derive(Clone, Copy)]
-pub enum Drawn {
-    /// Points of lamps.
-    Lamps,
-    /// Directions to suns.
-    Suns,
-}
-
 /// Radiance that lamps or suns send straight to the collision at `x`, through the boundary, scattered there against `w`, in
 /// which the path from the camera came: an estimate with the path's weight in it.
 ///
@@ -135,7 +100,7 @@ pub enum Drawn {
 /// chance, with its inverse as weight. Light reflected inside on its way is not in it.
 pub fn drawn_light(
     view: View<'_>,
-    ((body, through), lights, drawn): ((&Body, &Through), &Lights, Drawn),
+    ((body, through), lights, group): ((&Body, &Through), &Lights, Group),
     (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
@@ -144,12 +109,9 @@ pub fn drawn_light(
 ) -> Rgb {
     let u = [draws.number(), draws.number(), draws.number()];
     let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
-    let asked = match drawn {
-        Drawn::Lamps => lights.point(view.scene, u).map(|lamp| (Asked::Lamp(lamp), through.alone(lamp.object))),
-        Drawn::Suns => lights.sun(u).map(|sun| (Asked::Sun(sun), through.sun_alone(sun.pdf_angle))),
-    };
-    let Some(asked) = asked else { return Rgb::BLACK };
-    spectrum.value(&body.medium) * arriving(view, (body, through), &asked, (x, w), horizon, found, draws, tally)
+    let from = Reference::inside(x, &through.bounds);
+    let Some(drawn) = lights.sample(view.scene, group, &from, u) else { return Rgb::BLACK };
+    spectrum.value(&body.medium) * arriving(view, (body, through), &drawn, (x, w), horizon, found, draws, tally)
 }
 
 /// How far away facets are looked for; `None` where no surface is that near.
@@ -158,12 +120,12 @@ fn horizon(body: &Body, x: DVec3, draws: &mut Draws) -> Option<f32> {
     (body.clearance.at(x) <= horizon).then_some(horizon)
 }
 
-/// What arrives at `x` from the place that is asked, and whether that is left to points alone; per unit weight of the path.
+/// What arrives at `x` from what was drawn, per unit weight of the path.
 #[allow(clippy::too_many_arguments)] // what both callers have
 fn arriving(
     view: View<'_>,
     (body, through): (&Body, &Through),
-    (asked, alone): &(Asked, bool),
+    drawn: &LightSample,
     (x, w): (DVec3, Vec3),
     horizon: f32,
     found: &mut Vec<Crossing>,
@@ -172,14 +134,18 @@ fn arriving(
 ) -> Rgb {
     let decay = body.least_extinction;
     let mesh = &view.scene.objects[body.object as usize].mesh;
-    through.facets.crossings(mesh, x, asked.place(), horizon, found);
-    let mut sum = 0.0;
+    let towards = match drawn.end {
+        LightEnd::Point { at, .. } => Towards::Point(at.x),
+        LightEnd::Direction(w) => Towards::Direction(w),
+    };
+    through.facets.crossings(mesh, x, towards, horizon, found);
+    let (mut sum, alone) = (0.0, through.drawn_alone(drawn));
     let carried = |crossing: &Crossing| {
-        let light = line(body, crossing, asked, body.phase(w, crossing.inside), *alone);
+        let light = line(body, crossing, drawn, body.phase(w, crossing.inside), alone);
         let length = crossing.bend.lengths[0] as f32;
         // Over the chance that the horizon is not nearer.
         let weighted = decay * (length - SURE / decay).max(0.0);
-        asked.radiance() * body.medium.sigma_t.map(|s| (weighted - s * length).exp()) * light
+        drawn.radiance * body.medium.sigma_t.map(|s| (weighted - s * length).exp()) * light
     };
     found.retain(|crossing| {
         let light = carried(crossing).mean();
@@ -188,7 +154,7 @@ fn arriving(
     });
     let mut light = Rgb::BLACK;
     if found.len() <= MOST_TRACED {
-        for crossing in found.iter().filter(|c| open(view, body, x, c, asked, tally)) {
+        for crossing in found.iter().filter(|c| open(view, body, x, c, drawn, tally)) {
             light += carried(crossing);
         }
     } else {
@@ -202,7 +168,7 @@ fn arriving(
             while mark < below {
                 (mark, marks) = (mark + step, marks + 1.0);
             }
-            if marks > 0.0 && open(view, body, x, crossing, asked, tally) {
+            if marks > 0.0 && open(view, body, x, crossing, drawn, tally) {
                 light += carried * (marks * step / carried.mean());
             }
         }
@@ -211,44 +177,44 @@ fn arriving(
 }
 
 /// What arrives of the radiance over one line, over the density of what was drawn; without absorption.
-fn line(body: &Body, crossing: &Crossing, asked: &Asked, phase: f32, alone: bool) -> f32 {
-    let densities = match asked {
-        Asked::Lamp(lamp) => {
-            let cosine = lamp.cosine(crossing.outside);
+fn line(body: &Body, crossing: &Crossing, drawn: &LightSample, phase: f32, alone: bool) -> f32 {
+    let by_chance = match drawn.end {
+        LightEnd::Point { .. } => {
+            let cosine = drawn.cosine(crossing.outside);
             if cosine <= 0.0 {
                 return 0.0;
             }
             let passed = transmittance(1.0 / body.eta, crossing.bend.cosines[0] as f32);
-            let by_chance = phase * passed * cosine * crossing.bend.focus(body.eta.into()) as f32;
-            Densities { by_point: lamp.pdf_area, by_chance }
+            phase * passed * cosine * crossing.bend.focus(body.eta.into()) as f32
         }
-        Asked::Sun(sun) => {
-            Densities { by_point: sun.pdf_angle, by_chance: density_outside(body, &crossing.bend, phase) }
-        }
+        LightEnd::Direction(_) => density_outside(body, &crossing.bend, phase),
     };
+    let densities = Densities { by_point: drawn.pdf as f32, by_chance };
     densities.by_chance / densities.by_point * if alone { 1.0 } else { densities.share_by_point() }
 }
 
-/// Whether nothing stands between `x` and what is asked.
-fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &Asked, tally: &mut Tally) -> bool {
-    let open = is_open(view, body, x, crossing, asked, &mut tally.walk);
-    tally.rays.lights.ask(asked.light(), open);
+/// Whether nothing stands between `x` and what was drawn.
+fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, drawn: &LightSample, tally: &mut Tally) -> bool {
+    let open = is_open(view, body, x, crossing, drawn, &mut tally.walk);
+    tally.rays.lights.ask(drawn.light, open);
     open
 }
 
-fn is_open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &Asked, tally: &mut WalkTally) -> bool {
+fn is_open(
+    view: View<'_>,
+    body: &Body,
+    x: DVec3,
+    crossing: &Crossing,
+    drawn: &LightSample,
+    tally: &mut WalkTally,
+) -> bool {
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     tally.rays += 1;
     if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
         return false;
     }
     tally.rays += 1;
-    let from = at.leave(crossing.outside);
-    let outside = match asked {
-        Asked::Lamp(lamp) => Ray::between(from, lamp.at.arrive(crossing.outside, at.x, at.error)),
-        Asked::Sun(sun) => Ray::new(from, sun.w),
-    };
-    !view.rays.occluded(&outside)
+    !view.rays.occluded(&drawn.shadow(&at, crossing.outside))
 }
 
 /// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
@@ -269,7 +235,8 @@ pub fn share_by_chance(
     let normal = scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
     let focus = bend.focus(body.eta.into()) as f32 * normal.dot(direction).abs();
     let passed = transmittance(1.0 / body.eta, bend.cosines[0] as f32);
-    Densities { by_point: lights.pdf_area(hit.mesh), by_chance: straight.phase * passed * focus }.share_by_chance()
+    let by_point = lights.pdf_point(&Reference::inside(straight.from, &through.bounds), hit.mesh);
+    Densities { by_point, by_chance: straight.phase * passed * focus }.share_by_chance()
 }
 
 /// The same for a sun, drawn with density `by_point` [1/sr], and [`drawn_light`].
@@ -330,7 +297,7 @@ mod tests {
         let method = VolumePath::new(&scene, OPTIONS).unwrap();
         let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
         let through = method.through(body);
-        let from = ((body, through.unwrap()), lights, Drawn::Lamps);
+        let from = ((body, through.unwrap()), lights, Group::Near);
         let (mut points, mut chance) = (Mean::default(), Mean::default());
         let (mut found, mut tally) = (Vec::new(), Tally::default());
         for i in 0..samples {
@@ -348,7 +315,7 @@ mod tests {
                 let mu = to.dot(at.n_geometric);
                 let passed = transmittance(1.0 / body.eta, mu) * (-body.medium.sigma_t[0] * length).exp();
                 let phase = body.phase(w, to);
-                let straight = Straight { phase, length, cosines: [mu, out.dot(at.n_geometric)] };
+                let straight = Straight { from: x, phase, length, cosines: [mu, out.dot(at.n_geometric)] };
                 let light = emitted(&scene, &hit, out)[0] * passed;
                 lucky = [light, light * share_by_chance(&scene, lights, (body, through), &straight, &hit, out)];
             }
@@ -402,7 +369,7 @@ mod tests {
             let view = View { scene: &scene, rays: &*rays };
             let method = VolumePath::new(&scene, OPTIONS).unwrap();
             let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
-            let from = ((body, method.through(body).unwrap()), lights, Drawn::Lamps);
+            let from = ((body, method.through(body).unwrap()), lights, Group::Near);
             let (mut found, mut tally, mut most) = (Vec::new(), Tally::default(), 0.0_f32);
             for i in 0..100_000 {
                 let mut draws = Draws::new(&[], i);
