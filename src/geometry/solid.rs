@@ -15,6 +15,8 @@ pub(super) struct Face {
     /// Numbers of the places of the corners.
     pub(super) places: [u32; 3],
     pub(super) part: u32,
+    /// Number of its triangle in the mesh.
+    pub(super) triangle: u32,
 }
 
 impl Face {
@@ -102,7 +104,7 @@ impl Solid {
         order.par_sort_unstable();
         let face = |&(_, t): &(u64, u32)| {
             let v = mesh.triangles[t as usize];
-            Face { corners: v.map(point), places: v.map(|v| places[v as usize]), part: 0 }
+            Face { corners: v.map(point), places: v.map(|v| places[v as usize]), part: 0, triangle: t }
         };
         let mut faces: Vec<Face> = order.iter().map(face).collect();
         drop(order);
@@ -140,6 +142,11 @@ impl Solid {
         let from = self.edges.partition_point(|e| e.0 >> 1 < key);
         let uses = self.edges[from..].iter().take_while(move |e| e.0 >> 1 == key);
         uses.filter(move |e| e.1 != face).map(|e| &self.faces[e.1 as usize])
+    }
+
+    /// Enclosed by all parts \[unit³\]; of open ones nothing.
+    pub fn volume(&self) -> f64 {
+        self.parts.iter().map(|p| p.volume).sum()
     }
 
     /// Box of the whole [unit].

@@ -11,6 +11,7 @@ mod connect;
 mod draws;
 mod emission;
 mod facets;
+mod nesting;
 mod pencil;
 mod photons;
 mod spectrum;
@@ -22,6 +23,7 @@ use crate::error::{Error, Result};
 use crate::geometry::Clearance;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
+use crate::optics::Medium;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
@@ -33,6 +35,7 @@ use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 use connect::Scratch;
 use draws::Draws;
+use nesting::{Entry, Stack};
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
@@ -69,8 +72,8 @@ pub struct VolumePath {
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps and suns on the body itself, once photons have that.
     persistence: f32,
-    /// The body that the camera stands in.
-    camera_in: Option<u32>,
+    /// The bodies that the camera stands in.
+    camera_in: Stack,
     /// Whether this is [`Self::once`].
     once: bool,
 }
@@ -97,8 +100,8 @@ impl VolumePath {
         let source = |body: &Option<Body>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
-            let scatters = body.medium.albedo.max() > 0.0;
-            scatters.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
+            let alone = body.medium.albedo.max() > 0.0 && !body.nested;
+            alone.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
         };
         let sources = bodies.iter().map(source).collect();
         let diffuse = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_opaque());
@@ -108,7 +111,7 @@ impl VolumePath {
         let persistence = beside.sqrt().max(least);
         let throughs = throughs(scene, &lights, &bodies);
         let light = DirectLight { lights, samples: 1 };
-        Ok(Self { options, light, bodies, throughs, sources, persistence, camera_in: scene.camera_in(), once: false })
+        Ok(Self { options, light, bodies, throughs, sources, persistence, camera_in: Stack::of(scene.camera_in(), scene.nests()), once: false })
     }
 
     /// What to say of `scene` before it is rendered: light that may not be found.
@@ -128,7 +131,7 @@ impl VolumePath {
         let direction = ray.ray.direction;
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
         match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
-            (Some(body), _) => both_parts(&mut path, body, hit, direction),
+            (Some(_), _) => both_parts(&mut path, hit, direction),
             (None, Surface { emission: Some(_), .. }) => {
                 path.radiance = self.of_order_0(emitted(view.scene, hit, direction))
             }
@@ -148,7 +151,8 @@ impl VolumePath {
         body: &'a Body,
     ) -> Rgb {
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
-        if let Some(out) = path.through(body, ray.ray.origin, ray.ray.direction) {
+        let entry = Entry { stack: self.camera_in.clone(), ..Entry::alone(body) };
+        if let Some(out) = path.through(entry, ray.ray.origin, ray.ray.direction) {
             path.trace(out);
         }
         path.radiance
@@ -190,12 +194,14 @@ impl VolumePath {
         let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
         let endless = |body: Body| Body { endless: true, ..body };
         let lights = Lights::new(scene);
-        let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
+        // The models beside know nothing of others either.
+        let lone = |body: Body| Body { nested: false, ..endless(body) };
+        let body = |i| if wanted(i) { body(scene, i, 1).map(lone) } else { None };
         let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(body).collect();
         let sources = bodies.iter().map(|_| None).collect();
         let throughs = throughs(scene, &lights, &bodies);
         let light = DirectLight { lights, samples: 1 };
-        Self { options, light, bodies, throughs, sources, persistence: 1.0, camera_in: None, once: true }
+        Self { options, light, bodies, throughs, sources, persistence: 1.0, camera_in: Stack::default(), once: true }
     }
 
     /// Radiance of light that was scattered once in the body at `hit`, and comes to it straight from lamps and environment.
@@ -203,7 +209,7 @@ impl VolumePath {
         let Some(body) = &self.bodies[hit.mesh as usize] else { return Rgb::BLACK };
         let mut scratch = Scratch::default();
         let mut path = self.path(view, &[], ray.stream.split(0, 1), &mut scratch, tally);
-        if let Some(out) = enter(&mut path, body, hit, ray.ray.direction) {
+        if let Some(out) = enter(&mut path, Entry::alone(body), hit, ray.ray.direction) {
             path.meet_light(&out);
         }
         path.radiance
@@ -225,14 +231,22 @@ impl VolumePath {
     }
 }
 
-/// The body of object number `index`, where it is translucent and has a size.
+/// The body of object number `index`, where it is one and has a size.
 fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
-    let Some(t) = &scene.materials[object.material].surface.inside else { return None };
-    let bounds = object.mesh.bounds()?;
+    let surface = &scene.materials[object.material].surface;
+    let (medium, bounds) = (surface.medium()?, object.mesh.bounds()?);
+    let clear = surface.clear.as_ref();
+    let cells = if clear.is_some() { 1 } else { cells };
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, bounds, cells);
-    let body = Body::new(index as u32, &t.medium, clearance);
+    let body = match clear {
+        Some(clear) => {
+            let void = Medium { sigma_a: Rgb::BLACK, ..medium };
+            Body { absorbs: Some(clear.sigma_a), ..Body::new(index as u32, &void, clearance) }
+        }
+        None => Body::new(index as u32, &medium, clearance),
+    };
     let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
     let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {
         ObstacleKind::Sheet | ObstacleKind::Holes => Some(Cause::Hole),
@@ -240,7 +254,9 @@ fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
         ObstacleKind::Blemish => Some(Cause::Blemish),
         _ => None,
     });
-    Some(Body { leak: leak.unwrap_or(Cause::Rounding), ..body })
+    let leak = leak.unwrap_or(Cause::Rounding);
+    let (nests, contacts) = (scene.nests(), scene.nests().contacts[index].clone());
+    Some(Body { leak, nested: clear.is_some() || nests.meets[index], contacts, ..body })
 }
 
 /// How lamps and suns are asked for in each of the bodies that scatter.
@@ -267,7 +283,7 @@ impl Integrator for VolumePath {
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let mut scratch = Scratch::default();
-        if let Some(body) = self.camera_in.and_then(|o| self.bodies[o as usize].as_ref()) {
+        if let Some(body) = self.camera_in.top().and_then(|o| self.bodies[o as usize].as_ref()) {
             for (ray, out) in rays.iter().zip(out) {
                 *out = self.shade_inside(view, pass, ray, &mut scratch, tally, body);
             }
@@ -312,6 +328,10 @@ impl Integrator for VolumePath {
                 ),
                 None if !self.light.lights.has_emitters() && !self.light.lights.has_suns() => {
                     let why = "no area light, no sun in a picture: paths meet all light by themselves";
+                    Part::left_out(format!("photons in `{name}`"), why)
+                }
+                None if body.as_ref().is_some_and(|b| b.nested) => {
+                    let why = "it is clear, or meets other bodies: paths meet lamps by themselves";
                     Part::left_out(format!("photons in `{name}`"), why)
                 }
                 None => Part::left_out(format!("photons in `{name}`"), "switched off, or nothing for them to do"),

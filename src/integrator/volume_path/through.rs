@@ -237,6 +237,10 @@ fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &Aske
 }
 
 fn is_open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, asked: &Asked, tally: &mut WalkTally) -> bool {
+    // Behind a face in which another lies there is no air.
+    if body.contacts.contains_key(&crossing.triangle) {
+        return false;
+    }
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     tally.rays += 1;
     if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
