@@ -144,11 +144,6 @@ impl Solid {
         uses.filter(move |e| e.1 != face).map(|e| &self.faces[e.1 as usize])
     }
 
-    /// Enclosed by all parts \[unit³\]; of open ones nothing.
-    pub fn volume(&self) -> f64 {
-        self.parts.iter().map(|p| p.volume).sum()
-    }
-
     /// Box of the whole [unit].
     pub fn bounds(&self) -> Option<Aabb> {
         self.parts.iter().map(|p| p.bounds).reduce(Aabb::join)

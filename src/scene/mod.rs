@@ -35,6 +35,11 @@ pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Transluc
 // For what is above this room.
 #[doc(hidden)]
 pub use self::{
-    camera::Camera, difference::difference, doctor::Remark, environment::Environment, insides::{Contacts, Insides, Nests},
-    options::default_photons, view::View,
+    camera::Camera,
+    difference::difference,
+    doctor::Remark,
+    environment::Environment,
+    insides::{Contacts, Insides, Nests},
+    options::default_photons,
+    view::View,
 };

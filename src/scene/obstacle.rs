@@ -18,8 +18,8 @@ pub enum ObstacleKind {
     Unwelded,
     /// A surface without an inside.
     Sheet,
-    /// An open part in a closed one, or through it.
-    OpenPart,
+    /// Parts of a mesh that pass through each other, some of them open or looking inwards; an open part in a closed one.
+    Uncounted,
     /// A mesh with holes.
     Holes,
     /// Little of a surface passes through itself or lies inside.
@@ -72,7 +72,7 @@ impl Obstacle {
     pub fn refusal(&self) -> Option<String> {
         use ObstacleKind::*;
         let why = match self.kind {
-            Unwelded | Sheet | OpenPart | Faces | Walls | Turned => "`volume_path` needs an inside",
+            Unwelded | Sheet | Uncounted | Faces | Walls | Turned => "`volume_path` needs an inside",
             LampTouching | CameraTouching => "`volume_path` cannot tell whether that is inside",
             Crossing | Nested | Hidden | Touching | Holes | Blemish | LampInside | OpaqueTouching | CameraInside
             | Unknown => return None,
@@ -99,7 +99,7 @@ impl Obstacle {
                 "`subsurface` lets no light pass between them, and the faces that touch stay dark or not by chance; take \
                  --method volume_path"
             }
-            (_, Unwelded | Holes | Sheet | OpenPart) => {
+            (_, Unwelded | Holes | Sheet | Uncounted) => {
                 "`subsurface` takes it for the skin of a thick body: what enters on one side does not leave on the other"
             }
             (_, Faces | Walls | Turned) => "`subsurface` lights each face as if the outside were before it",

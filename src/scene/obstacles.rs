@@ -172,7 +172,7 @@ impl Found {
 fn ranks(scene: &Scene, bodies: &[Option<Body<'_>>]) -> Nests {
     let media = bodies.iter().flatten().filter(|b| b.kind == Role::Medium);
     let mut order: Vec<(i32, f64, u32)> =
-        media.map(|b| (b.object.priority, -b.solid.volume(), b.index)).collect();
+        media.map(|b| (b.object.priority, -b.object.mesh.volume(), b.index)).collect();
     order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
     let mut nests = Nests { rank: vec![0; scene.objects.len()], ..Nests::default() };
     nests.contacts.resize_with(scene.objects.len(), Default::default);
@@ -280,8 +280,9 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
     let found = meeting(solid, solid, gap, Seek::Crossing, |[a, b]| a != b && large(a) && large(b));
     let all = parts.len();
     let union = "make one surface of them (a union), or cut one out of the other";
-    // An open part has no inside to count.
-    let countable = |kind| if parts.iter().all(|p| p.closed) { kind } else { ObstacleKind::OpenPart };
+    // How often the surface is around a place tells nothing with open parts, and with some that look inwards.
+    let counts = parts.iter().all(|p| p.closed && p.volume > 0.0);
+    let countable = |kind| if counts { kind } else { ObstacleKind::Uncounted };
     if let Some(c) = &found.crossing {
         let what = format!("two of its {all} parts overlap: they pass through each other {}", near(scene, c, gap));
         return say(countable(ObstacleKind::Crossing), what, union);
@@ -344,8 +345,16 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
     let all = parts.len();
     let cavity = "remove them, or make them cavities: closed, their faces turned inwards";
     let inside = [
-        (ObstacleKind::Nested, nested, ["lies inside another part, and looks outwards", "lie inside another part, and look outwards"]),
-        (ObstacleKind::OpenPart, open, ["is open and lies inside a closed one", "are open and lie inside a closed one"]),
+        (
+            ObstacleKind::Nested,
+            nested,
+            ["lies inside another part, and looks outwards", "lie inside another part, and look outwards"],
+        ),
+        (
+            ObstacleKind::Uncounted,
+            open,
+            ["is open and lies inside a closed one", "are open and lie inside a closed one"],
+        ),
     ];
     for (kind, (count, part), [one, many]) in inside {
         let kind = if part > MINOR * area { kind } else { ObstacleKind::Blemish };
@@ -434,7 +443,8 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
                 _ => return None,
             };
             let (outside, inside) = (&outer.object.name, &inner.object.name);
-            let what = format!("{} {one:?} and {other:?} overlap: {inside:?} lies inside {outside:?}", kinds(scene, a, b));
+            let what =
+                format!("{} {one:?} and {other:?} overlap: {inside:?} lies inside {outside:?}", kinds(scene, a, b));
             let hidden = nests.rank[inner.index as usize] < nests.rank[outer.index as usize];
             if hidden && bodies_in(&inner.solid, &outer.solid) {
                 let remedy = format!("give {inside:?} a priority above {}", outer.object.priority);

@@ -70,7 +70,8 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         let (absorbed, sigma) = (medium_inside.sigma_a, medium_inside.sigma_t_prime());
         let path = 1.0 / f64::from(sigma.max());
         let decay = (0..3).map(|c| (3.0 * f64::from(absorbed[c]) * f64::from(sigma[c])).sqrt()).fold(0.0, f64::max);
-        let limit = if surface.inside.as_ref().is_some_and(&walks) { (DENSE * path).min(THIN / decay) } else { f64::INFINITY };
+        let limit =
+            if surface.inside.as_ref().is_some_and(&walks) { (DENSE * path).min(THIN / decay) } else { f64::INFINITY };
         let medium = || format!("{} units, and light falls by 1/e over {}", short(path), short(1.0 / decay));
         let why = if let Some((share, thickness)) = thinner(&probes, |p| p.offset / THIN) {
             Some(format!(

@@ -166,7 +166,13 @@ impl<'a> CameraPath<'a> {
                     return None;
                 }
                 self.by_bsdf = None;
-                let w = self.view.scene.surface(entry.body.object).bsdf.sample(&at, -direction, [self.draws.number(), 0.0, 0.0])?.wi;
+                let w = self
+                    .view
+                    .scene
+                    .surface(entry.body.object)
+                    .bsdf
+                    .sample(&at, -direction, [self.draws.number(), 0.0, 0.0])?
+                    .wi;
                 if w.dot(at.n_geometric) < 0.0 { self.inside(entry, &at, w) } else { Some(Ray::new(at.leave(w), w)) }
             }
         }

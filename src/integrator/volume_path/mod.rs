@@ -87,7 +87,7 @@ impl VolumePath {
     /// Tables for the translucent objects of `scene`, and for no others.
     ///
     /// # Errors
-    /// What [`super::traceable`] finds: media in one another, surfaces that touch, meshes without an inside.
+    /// What [`super::traceable`] finds: meshes without an inside, lamps and cameras in surfaces.
     pub fn new(scene: &Scene, options: VolumePathOptions) -> Result<Self> {
         let refusals: Vec<String> = scene.obstacles().iter().filter_map(Obstacle::refusal).collect();
         if !refusals.is_empty() {
@@ -111,7 +111,16 @@ impl VolumePath {
         let persistence = beside.sqrt().max(least);
         let throughs = throughs(scene, &lights, &bodies);
         let light = DirectLight { lights, samples: 1 };
-        Ok(Self { options, light, bodies, throughs, sources, persistence, camera_in: Stack::of(scene.camera_in(), scene.nests()), once: false })
+        Ok(Self {
+            options,
+            light,
+            bodies,
+            throughs,
+            sources,
+            persistence,
+            camera_in: Stack::of(scene.camera_in(), scene.nests()),
+            once: false,
+        })
     }
 
     /// What to say of `scene` before it is rendered: light that may not be found.

@@ -27,9 +27,6 @@ pub struct Stack(Vec<(u32, u32)>);
 /// An object, and +1 where light goes in, -1 where it comes out.
 type Turn = (u32, i32);
 
-/// Faces crossed at one place beyond which the table is not read on.
-const MOST_FACES: usize = 16;
-
 impl Stack {
     /// Of bodies in any order.
     pub fn of(around: &[(u32, u32)], nests: &Nests) -> Self {
@@ -94,7 +91,7 @@ fn faces(view: View<'_>, body: &Body, hit: &Hit, at: &SurfacePoint, w: Vec3) -> 
     for partner in partners {
         let mesh = &view.scene.objects[partner.object as usize].mesh;
         let key = (partner.object, partner.part);
-        if !seen.contains(&key) && seen.len() < MOST_FACES && holds(mesh.corners(partner.triangle), at.x, gap) {
+        if !seen.contains(&key) && holds(mesh.corners(partner.triangle), at.x, gap) {
             seen.push(key);
             turns.push((partner.object, turn(mesh.geometric_normal(partner.triangle))));
         }
