@@ -103,9 +103,7 @@ impl Found {
             let before = found.obstacles.len();
             let solid = alone(scene, body, &mut found.obstacles);
             found.look_from(scene, body, solid);
-            if found.obstacles[before..].iter().any(|o| o.overlaps()) {
-                found.join(body, body);
-            }
+            found.nests.meets[body.index as usize] = found.obstacles[before..].iter().any(|o| o.overlaps());
         }
         let (mut meet, mut meets) = (0, vec![false; bodies.len()]);
         for (i, j) in pairs {
@@ -120,6 +118,11 @@ impl Found {
                     found.join(a, b);
                 }
                 found.obstacles.push(obstacle);
+            }
+        }
+        for body in bodies.iter().flatten().filter(|b| b.solid.parts.len() > 1) {
+            if found.nests.meets[body.index as usize] {
+                found.join(body, body);
             }
         }
         found

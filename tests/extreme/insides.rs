@@ -399,10 +399,10 @@ fn a_camera_in_the_surface_of_a_body_refused() {
 #[test]
 fn hundreds_of_bodies_in_one_place_ok() {
     let mut text =
-        "unit = \"mm\"\n[camera]\nposition = [0.3, 0.2, 9]\nlook_at = [0, 0, 0]\nfov = 20\nresolution = [8, 8]\n\
+        "unit = \"mm\"\n[camera]\nposition = [0.3, 0.2, 9]\nlook_at = [0, 0, 0]\nfov = 20\nresolution = [8, 8]\n[environment]\nradiance = 1\n\
                     [material.wax]\ntype = \"translucent\"\nsigma_s = 1\nsigma_a = 0\ng = 0\neta = 1.3\n"
             .to_string();
-    let all = 200;
+    let all = 60;
     for i in 0..all {
         text += &format!("[[object]]\nname = \"{i}\"\nmesh = \"a.obj\"\nmaterial = \"wax\"\n");
     }

@@ -40,6 +40,10 @@ impl Stack {
         self.0.last().map(|(object, _)| *object)
     }
 
+    fn holds(&self, object: u32) -> bool {
+        self.0.iter().any(|(other, _)| *other == object)
+    }
+
     /// Whether there is this body alone, once.
     fn is_only(&self, object: u32) -> bool {
         self.0[..] == [(object, 1)]
@@ -80,8 +84,9 @@ struct Faces {
     margin: f64,
 }
 
-/// The surfaces that light along `w` meets at `hit`: its own first, then those that lie in it.
-fn faces(view: View<'_>, body: &Body, hit: &Hit, at: &SurfacePoint, w: Vec3) -> Faces {
+/// The surfaces that light along `w`, with `stack` around it, meets at `hit`: its own first, then those that lie in it. At the rim of
+/// those rounding decides; there only a body that is around can be left.
+fn faces(view: View<'_>, stack: &Stack, body: &Body, hit: &Hit, at: &SurfacePoint, w: Vec3) -> Faces {
     let turn = |n: Vec3| if n.dot(w) < 0.0 { 1 } else { -1 };
     let mut turns = vec![(hit.mesh, turn(at.n_geometric))];
     let Some(partners) = body.contacts.get(&hit.triangle) else { return Faces { turns, margin: 0.0 } };
@@ -91,22 +96,34 @@ fn faces(view: View<'_>, body: &Body, hit: &Hit, at: &SurfacePoint, w: Vec3) -> 
     for partner in partners {
         let mesh = &view.scene.objects[partner.object as usize].mesh;
         let key = (partner.object, partner.part);
-        if !seen.contains(&key) && holds(mesh.corners(partner.triangle), at.x, gap) {
-            seen.push(key);
-            turns.push((partner.object, turn(mesh.geometric_normal(partner.triangle))));
+        if seen.contains(&key) {
+            continue;
         }
+        let (inside, turn) =
+            (within(mesh.corners(partner.triangle), at.x), turn(mesh.geometric_normal(partner.triangle)));
+        let around = turn < 0 && stack.holds(partner.object);
+        let rim = if around { -gap } else { RIM * if turn > 0 { -gap } else { gap } };
+        if inside >= rim {
+            seen.push(key);
+            turns.push((partner.object, turn));
+        }
+    }
+    let own = view.scene.objects[hit.mesh as usize].mesh.corners(hit.triangle);
+    if turns.len() > 1 && turns[0].1 < 0 && !stack.holds(hit.mesh) && within(own, at.x) <= gap {
+        turns.remove(0);
     }
     Faces { turns, margin: 2.0 * gap }
 }
 
-/// Whether a place in the plane of a triangle is in it, or no farther from it than `gap` [unit].
-fn holds(corners: [DVec3; 3], x: DVec3, gap: f64) -> bool {
+/// Share of the gap within which rounding puts a place beside the edge of a triangle.
+const RIM: f64 = 1.0 / 32.0;
+
+/// How far a place in the plane of a triangle is inside it [unit]; below 0 outside.
+fn within(corners: [DVec3; 3], x: DVec3) -> f64 {
     let [a, b, c] = corners;
     let n = (b - a).cross(c - a).normalize_or_zero();
-    [[a, b], [b, c], [c, a]].into_iter().all(|[from, to]| {
-        let inwards = n.cross(to - from).normalize_or_zero();
-        inwards.dot(x - from) >= -gap
-    })
+    let inside = |[from, to]: [DVec3; 2]| n.cross(to - from).normalize_or_zero().dot(x - from);
+    [[a, b], [b, c], [c, a]].map(inside).into_iter().fold(f64::INFINITY, f64::min)
 }
 
 /// A way into bodies from outside all.
@@ -131,7 +148,7 @@ impl<'a> Entry<'a> {
             return Some(Self::alone(body));
         }
         let at = view.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
-        let faces = faces(view, body, hit, &at, w);
+        let faces = faces(view, &Stack::default(), body, hit, &at, w);
         let stack = Stack::default().crossed(&faces.turns, view.scene.nests())?;
         Some(Self { body: bodies[stack.top()? as usize].as_ref()?, stack, margin: faces.margin })
     }
@@ -242,7 +259,7 @@ pub fn walk<'a>(
                 (from, phase) = (at.leave(w), None);
                 continue;
             }
-            _ => bodies[hit.mesh as usize].as_ref().map(|other| faces(view, other, &hit, &at, w)),
+            _ => bodies[hit.mesh as usize].as_ref().map(|other| faces(view, &stack, other, &hit, &at, w)),
         };
         let beyond = met.and_then(|faces| Some((stack.crossed(&faces.turns, nests)?, faces)));
         let Some((after, faces)) = beyond else {
