@@ -284,6 +284,12 @@ fn lamps_are_asked_for_neither_twice_nor_never() {
         ("a bubble", bubble, cavity),
         ("halves that touch", vec![half(-1.0, 0.1), half(0.1, 1.0)], vec![half(-1.0, 1.0)]),
         ("halves that overlap", vec![half(-1.0, 0.3), half(-0.2, 1.0)], vec![half(-1.0, 1.0)]),
+        // The lamp is in the air around the ball, which is a body.
+        (
+            "a lamp in the outer body",
+            vec![(cuboid([-7.0; 3], [7.0; 3]), "air", ""), (ball([0.0; 3], 1.0), "wax", "")],
+            vec![(ball([0.0; 3], 1.0), "wax", "")],
+        ),
         ("a block twice", vec![half(-1.0, 1.0), half(-1.0, 1.0)], vec![half(-1.0, 1.0)]),
     ] {
         let [nested, alone] = [nested, alone].map(|things| mean(&scene(head, &things, &media), 256));

@@ -253,14 +253,14 @@ impl<'a> CameraPath<'a> {
 
     /// Through bodies from `from`, inside, along `w`; the ray on which the path leaves them.
     pub fn through(&mut self, entry: Entry<'a>, from: DVec3, w: Vec3) -> Option<Ray> {
-        let Entry { body, stack, .. } = entry;
+        let Entry { body, stack, through, .. } = entry;
         let (mut spectrum, mut draws) = (self.spectrum, self.draws.clone());
         let mut walks = WalkTally::default();
         let view = self.view;
         let bodies = &self.method.bodies;
         let left = if body.nested {
             let mut guide = Nested(self);
-            nesting::walk(view, bodies, (stack, from, w), &mut spectrum, &mut draws, &mut guide, &mut walks)
+            nesting::walk(view, bodies, ((stack, through), from, w), &mut spectrum, &mut draws, &mut guide, &mut walks)
         } else {
             let mut watch = Gather { path: self, body, lit: true };
             let exit = body.walk(view, (from, w), &mut spectrum, &mut draws, &mut watch, &mut walks);

@@ -134,12 +134,14 @@ pub struct Entry<'a> {
     pub stack: Stack,
     /// Rays start this far away at least [unit].
     pub margin: f64,
+    /// The object and the triangle that it leads through.
+    pub through: Option<(u32, u32)>,
 }
 
 impl<'a> Entry<'a> {
     /// Into a body that meets no other.
     pub fn alone(body: &'a Body) -> Self {
-        Self { body, stack: Stack::default(), margin: 0.0 }
+        Self { body, stack: Stack::default(), margin: 0.0, through: None }
     }
 
     /// Into `body` at `hit` along `w`, and into others whose faces lie there; `None` where rays cannot tell.
@@ -150,7 +152,8 @@ impl<'a> Entry<'a> {
         let at = view.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v);
         let faces = faces(view, &Stack::default(), body, hit, &at, w);
         let stack = Stack::default().crossed(&faces.turns, view.scene.nests())?;
-        Some(Self { body: bodies[stack.top()? as usize].as_ref()?, stack, margin: faces.margin })
+        let body = bodies[stack.top()? as usize].as_ref()?;
+        Some(Self { body, stack, margin: faces.margin, through: Some((hit.mesh, hit.triangle)) })
     }
 }
 
@@ -183,12 +186,12 @@ fn flight(view: View<'_>, body: &Body, from: DVec3, w: Vec3, distance: f32, tall
     }
 }
 
-/// Follows light from `from` along `w`, with `stack` around it, until it is outside all bodies, and tells the body that it left; `None` where
+/// Follows light from `from` along `w`, with `stack` around it and the triangle `last` behind it, until it is outside all bodies, and tells the body that it left; `None` where
 /// it is absorbed, ended by a watch, or lost. As [`Body::walk`], from body to body.
 pub fn walk<'a>(
     view: View<'_>,
     bodies: &'a [Option<Body>],
-    (mut stack, mut from, mut w): (Stack, DVec3, Vec3),
+    ((mut stack, mut last), mut from, mut w): ((Stack, Option<(u32, u32)>), DVec3, Vec3),
     spectrum: &mut Spectrum,
     draws: &mut Draws,
     guide: &mut impl Guide,
@@ -219,7 +222,7 @@ pub fn walk<'a>(
                 }
                 let next = body.scatter(w, draws);
                 phase = Some(body.phase(w, next));
-                (from, w) = (x, next);
+                (from, w, last) = (x, next, None);
                 continue;
             }
             Met::Surface(hit) => hit,
@@ -243,6 +246,12 @@ pub fn walk<'a>(
         }
         let object = &view.scene.objects[hit.mesh as usize];
         let at = object.mesh.point(hit.triangle, hit.u, hit.v);
+        if last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle)) {
+            // No line meets a plane twice: the start of the ray was rounded to its wrong side, as at needles.
+            from = SurfacePoint { error: 2.0 * at.error, ..at }.leave(w);
+            ahead = Some((distance - hit.t).max(0.0));
+            continue;
+        }
         let met = match view.scene.surface(hit.mesh) {
             Surface { emission: Some(_), .. } => {
                 guide.watch(body, false).lamp(&hit, w, spectrum);
