@@ -1,5 +1,5 @@
-//! Random scenes of two to four translucent bodies: what `volume_path` accepts it traces without loss, and what is on paper
-//! two media at one place it refuses. `MARMOR_GEOMETRY_SCENES=10000` asks for more scenes than the suite has.
+//! Random scenes of two to four translucent bodies, apart, touching and in one another: what `volume_path` accepts, which is most, it
+//! traces without loss. `MARMOR_GEOMETRY_SCENES=10000` asks for more scenes than the suite has.
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
@@ -109,13 +109,6 @@ const ALL: [Placed; 9] = [
     Placed::Through,
 ];
 
-impl Placed {
-    /// Whether `volume_path` has to refuse it, whatever else is there.
-    fn is_bad(self) -> bool {
-        matches!(self, Self::Face | Self::Equal | Self::Overlap | Self::Nested | Self::Through)
-    }
-}
-
 /// A body placed so with regard to `last`, a box where that is asked for.
 fn place(dice: &mut Dice, last: &Body, how: Placed) -> Body {
     let mut new = body(dice, matches!(how, Placed::Face | Placed::Nearly | Placed::Edge));
@@ -186,14 +179,8 @@ fn place(dice: &mut Dice, last: &Body, how: Placed) -> Body {
     new
 }
 
-fn area(mesh: &ObjMesh) -> f64 {
-    let corners = |t: &[u32; 3]| t.map(|i| mesh.positions[i as usize]);
-    mesh.triangles.iter().map(corners).map(|[a, b, c]| 0.5 * (b - a).cross(c - a).length()).sum()
-}
-
-/// A scene, what its bodies are to each other, and of each pair in one mesh the share of the mesh's area that the smaller one has; 1
-/// for pairs of objects.
-fn scene(number: u64) -> (Scene, Vec<(Placed, f64)>) {
+/// A scene, and what its bodies are to each other.
+fn scene(number: u64) -> (Scene, Vec<Placed>) {
     let mut dice = Dice(number << 20);
     let mut bodies = vec![body(&mut dice, number.is_multiple_of(2))];
     let mut placed = Vec::new();
@@ -219,12 +206,6 @@ fn scene(number: u64) -> (Scene, Vec<(Placed, f64)>) {
             meshes.push(vec![bodies.len() - 1]);
         }
     }
-    let areas: Vec<f64> = bodies.iter().map(|b| area(&b.mesh)).collect();
-    let share = |i: usize| {
-        let mesh = meshes.iter().find(|parts| parts.contains(&i) && parts.contains(&(i + 1)));
-        mesh.map_or(1.0, |parts| areas[i].min(areas[i + 1]) / parts.iter().map(|&b| areas[b]).sum::<f64>())
-    };
-    let placed = placed.into_iter().enumerate().map(|(i, how)| (how, share(i))).collect();
     // Turned, half of them.
     let turn = if dice.below(2) == 0 {
         glam::DMat3::IDENTITY
@@ -262,9 +243,6 @@ fn scene(number: u64) -> (Scene, Vec<(Placed, f64)>) {
     (load_in(folder.path(), &text), placed)
 }
 
-/// Share of the area of a mesh below which parts that are badly placed are no reason to refuse it.
-const MINOR: f64 = 1e-3;
-
 #[test]
 fn no_scene_is_both_accepted_and_wrong() {
     let count = std::env::var("MARMOR_GEOMETRY_SCENES").map_or(270, |n| n.parse().unwrap());
@@ -274,14 +252,6 @@ fn no_scene_is_both_accepted_and_wrong() {
         let (scene, placed) = scene(number);
         let refusals = traceable(&scene);
         let what = format!("scene {number}, {placed:?}: {refusals:?}");
-        // A body in a cavity is well placed.
-        let in_cavity = |i: usize| placed[i].0 == Placed::Nested && i > 0 && placed[i - 1].0 == Placed::Cavity;
-        let bad = |i: &usize| placed[*i].0.is_bad() && !in_cavity(*i);
-        // Less than a thousandth of a mesh inside itself is traced; what that loses is held to below.
-        if (0..placed.len()).filter(bad).any(|i| placed[i].1 > MINOR) {
-            assert!(!refusals.is_empty(), "accepted: {what}");
-            continue;
-        }
         if placed.len() == 1 {
             assert!(refusals.is_empty(), "refused: {what}");
         }
@@ -317,5 +287,5 @@ fn no_scene_is_both_accepted_and_wrong() {
     println!(
         "{accepted} of {count} scenes accepted; {lost} of {paths} paths lost; furnaces off by {worst:.1e} at most"
     );
-    assert!(accepted * 7 > count && accepted * 2 < count, "{accepted} of {count}");
+    assert!(accepted * 10 > count * 7, "{accepted} of {count}");
 }

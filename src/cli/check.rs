@@ -232,6 +232,9 @@ fn describe(surface: &Surface) -> Vec<String> {
         Surface { emission: Some(Emission { radiance, two_sided }), .. } => {
             vec![format!("emissive, radiance {:?}{}", radiance.0, if *two_sided { ", two-sided" } else { "" })]
         }
+        Surface { clear: Some(clear), .. } => {
+            vec![format!("dielectric, eta {}, sigma_a {:?}", clear.eta, clear.sigma_a.0)]
+        }
         Surface { inside: None, bsdf, .. } => vec![bsdf.text()],
         Surface { inside: Some(t), .. } => {
             let free_path = t.medium.sigma_t_prime().map(|s| 1.0 / s);

@@ -88,8 +88,8 @@ pub fn of(prepared: &Prepared, window: Window, view: Option<View<'_>>) -> Need {
             }
             _ => 0,
         };
-        let translucent = looks_inside && scene.materials[o.material].surface.is_translucent();
-        read.max(faces * if translucent { LOOKING_INSIDE } else { LOOKING })
+        let body = looks_inside && scene.materials[o.material].surface.is_body();
+        read.max(faces * if body { LOOKING_INSIDE } else { LOOKING })
     });
     let rendering = need.film + need.pictures + need.trees + need.pass;
     let most = loading.max().unwrap_or(0).max(building + tables).max(rendering);

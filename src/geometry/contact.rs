@@ -101,6 +101,35 @@ pub fn meeting(a: &Solid, b: &Solid, gap: f64, seek: Seek, major: impl Fn([u32; 
     }
 }
 
+/// Two triangles that lie in each other over an area.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lying {
+    /// The triangles of the one and the other mesh.
+    pub triangles: [u32; 2],
+    /// The parts that they belong to.
+    pub parts: [u32; 2],
+}
+
+/// All faces of `a` and `b` that lie in each other; of a solid with itself, those of different parts. `None` where there are too many in
+/// one place to look at.
+pub fn lying(a: &Solid, b: &Solid, gap: f64) -> Option<Vec<Lying>> {
+    let work = |task: &NodePair| {
+        let (mut found, mut seen) = (Vec::new(), 0);
+        a.tree.pairs(&b.tree, *task, gap as f32, |i, j| {
+            seen += 1;
+            let (one, two) = (&a.faces[i as usize], &b.faces[j as usize]);
+            let apart = !std::ptr::eq(a, b) || one.part != two.part;
+            if apart && meet((a, i), (b, j), gap, Seek::Touching).is_some() {
+                found.push(Lying { triangles: [one.triangle, two.triangle], parts: [one.part, two.part] });
+            }
+            seen > MOST_PAIRS
+        });
+        (seen <= MOST_PAIRS).then_some(found)
+    };
+    let all: Option<Vec<Vec<Lying>>> = a.tree.tasks(&b.tree, gap as f32).par_iter().map(work).collect();
+    all.map(|found| found.concat())
+}
+
 /// How two faces meet.
 fn meet((a, i): (&Solid, u32), (b, j): (&Solid, u32), gap: f64, seek: Seek) -> Option<(Kind, DVec3)> {
     let (one, two) = (&a.faces[i as usize], &b.faces[j as usize]);

@@ -88,6 +88,16 @@ impl Mesh {
         0.5 * self.scaled_normal(triangle).length()
     }
 
+    /// What it encloses \[unit³\]; with small holes nearly so.
+    pub fn volume(&self) -> f64 {
+        let Some(middle) = self.bounds().map(|b| b.centre()) else { return 0.0 };
+        let under = |t: u32| {
+            let [a, b, c] = self.corners(t).map(|p| p - middle);
+            a.dot(b.cross(c)) / 6.0
+        };
+        (0..self.triangles.len() as u32).map(under).sum()
+    }
+
     /// Unit outward normal of a triangle; zero for a triangle without area.
     #[inline]
     pub fn geometric_normal(&self, triangle: u32) -> Vec3 {

@@ -27,7 +27,7 @@ use crate::math::DVec3;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
-pub use contact::{Contact, Meeting, Seek, meeting};
+pub use contact::{Contact, Meeting, Seek, lying, meeting};
 pub use curvature::Curvature;
 pub use doctor::{Findings, Mended, examine, mended};
 pub use mesh::{Mesh, Normals, Precision, SurfacePoint};

@@ -15,6 +15,8 @@ pub(super) struct Face {
     /// Numbers of the places of the corners.
     pub(super) places: [u32; 3],
     pub(super) part: u32,
+    /// Number of its triangle in the mesh.
+    pub(super) triangle: u32,
 }
 
 impl Face {
@@ -102,7 +104,7 @@ impl Solid {
         order.par_sort_unstable();
         let face = |&(_, t): &(u64, u32)| {
             let v = mesh.triangles[t as usize];
-            Face { corners: v.map(point), places: v.map(|v| places[v as usize]), part: 0 }
+            Face { corners: v.map(point), places: v.map(|v| places[v as usize]), part: 0, triangle: t }
         };
         let mut faces: Vec<Face> = order.iter().map(face).collect();
         drop(order);

@@ -328,6 +328,10 @@ impl Round<'_> {
                 (ray, flux) = next;
                 continue;
             }
+            // Clear bodies are shown by `volume_path` alone.
+            if !surface.is_opaque() {
+                return;
+            }
             let Some(next) = surface.bsdf.sample(&at, w, [draws.number(), draws.number(), draws.number()]) else {
                 return;
             };

@@ -46,7 +46,10 @@ fn why(scene: &Scene, name: &str, cause: Cause) -> String {
         Cause::Blemish => "its surface passes through itself: a union of the mesh with itself mends that".into(),
         Cause::OtherMedium => {
             let overlaps = |kind: ObstacleKind| {
-                matches!(kind, ObstacleKind::Crossing | ObstacleKind::Nested | ObstacleKind::Touching)
+                matches!(
+                    kind,
+                    ObstacleKind::Crossing | ObstacleKind::Nested | ObstacleKind::Hidden | ObstacleKind::Touching
+                )
             };
             let with = scene.obstacles().iter().filter(|o| overlaps(o.kind) && o.objects.len() == 2);
             let others: Vec<String> = with
@@ -57,7 +60,10 @@ fn why(scene: &Scene, name: &str, cause: Cause) -> String {
             if others.is_empty() {
                 "they met another medium inside it, put there by rounding: leave a larger gap between the two".into()
             } else {
-                format!("they met {} inside it: move them apart, or make one mesh of both", others.join(", "))
+                format!(
+                    "they met {} inside it: move them apart, make one mesh of both, or take --method volume_path",
+                    others.join(", ")
+                )
             }
         }
         Cause::Endless => format!(

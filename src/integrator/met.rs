@@ -30,7 +30,7 @@ impl KnownLights {
 
     /// The same, for a method whose paths also meet them through clear bodies and on mirrors.
     pub fn met(scene: &Scene, lights: &Lights) -> Self {
-        let body = |o: &crate::scene::Object| scene.materials[o.material].surface.is_translucent();
+        let body = |o: &crate::scene::Object| scene.materials[o.material].surface.is_body();
         Self { lights: lights.counted(scene), by_chance: scene.objects.iter().any(body) }
     }
 

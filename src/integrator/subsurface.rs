@@ -220,7 +220,8 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
         return false;
     }
     let reflects = |(i, o): &(usize, &Object)| {
-        modelled[*i].is_some() || !scene.materials[o.material].surface.bsdf.albedo().is_black()
+        let surface = &scene.materials[o.material].surface;
+        modelled[*i].is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
     };
     let mut all = scene.objects.iter().enumerate().filter(reflects);
     match (all.next(), all.next()) {

@@ -200,7 +200,7 @@ mod tests {
     fn object(mesh: &crate::geometry::ObjMesh) -> Object {
         let mesh = mesh.recentred(DVec3::ZERO);
         let findings = examine(&mesh);
-        Object { name: String::new(), mesh, at: String::new(), material: 0, flipped: false, findings }
+        Object { name: String::new(), mesh, at: String::new(), material: 0, flipped: false, findings, priority: 0 }
     }
 
     /// Six rectangles, their corners at the same places.

@@ -39,7 +39,8 @@ impl Scene {
         let environment = file.environment.load(folder, &mut said)?;
         let placed = meshes(file, folder, repair, &mut said)?;
         let translucent = |entry: &ObjectEntry| file.materials[entry.material].surface.is_translucent();
-        let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| translucent(entry)).map(|(_, mesh)| mesh);
+        let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
+        let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
         let mut objects = Vec::with_capacity(placed.len());
         for (entry, mesh) in file.objects.iter().zip(placed) {
@@ -54,7 +55,8 @@ impl Scene {
             let findings = examine(&mesh);
             said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
             let (name, at) = (entry.name.clone(), entry.at.clone());
-            objects.push(Object { name, mesh, at, material: entry.material, flipped: entry.flip, findings });
+            let (material, priority) = (entry.material, entry.priority);
+            objects.push(Object { name, mesh, at, material, flipped: entry.flip, findings, priority });
         }
         let mut scene = Self {
             name: file.path.display().to_string(),
@@ -97,12 +99,14 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The method where the file asks for none: subsurface with a translucent object, else paths where there is light, else ambient
-    /// occlusion.
+    /// The method where the file asks for none: subsurface with a translucent object, else paths through media with a clear one, else
+    /// paths where there is light, else ambient occlusion.
     pub fn default_method(&self) -> MethodName {
         let any = |test: fn(&Surface) -> bool| self.objects.iter().any(|o| test(&self.materials[o.material].surface));
         if any(Surface::is_translucent) {
             MethodName::Subsurface
+        } else if any(Surface::is_body) {
+            MethodName::VolumePath
         } else if !self.environment.is_black() || any(|s| s.emission.is_some()) {
             MethodName::Path
         } else {

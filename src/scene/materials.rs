@@ -2,7 +2,7 @@
 
 use super::tree::{Fields, Node};
 use super::values::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
-use super::{Emission, Surface, Translucent};
+use super::{Dielectric, Emission, Surface, Translucent};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
@@ -19,7 +19,7 @@ pub struct MaterialEntry {
     pub at: String,
 }
 
-const KINDS: &[&str] = &["translucent", "diffuse", "emissive"];
+const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "emissive"];
 const COEFFICIENT: &str = "one number or three in 1/unit, none negative";
 const G: &str = "a number above -1 and below 1";
 const ETA: &str = "n_inside / n_outside, a number above 0";
@@ -29,7 +29,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
     let Some(table) = top.table("material")? else { return Ok(Vec::new()) };
     let entries = table.tables().map(|entry| {
         let (name, m) = entry?;
-        let kind = m.need("type", "\"translucent\", \"diffuse\" or \"emissive\"", Node::text)?;
+        let kind = m.need("type", "\"translucent\", \"dielectric\", \"diffuse\" or \"emissive\"", Node::text)?;
         let surface = match kind {
             "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0))?,
             "diffuse" => {
@@ -44,7 +44,8 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
                 let two_sided = switch(&m, "two_sided")?.unwrap_or(false);
                 Surface::emissive(Emission { radiance: rgb(radiance), two_sided })
             }
-            "dielectric" | "mirror" => {
+            "dielectric" => dielectric(&m, unit_in_mm.unwrap_or(1.0))?,
+            "mirror" => {
                 let what = format!("{kind:?} is not built yet; there are {}", KINDS.join(", "));
                 return Err(m.error_at("type", what));
             }
@@ -53,6 +54,22 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
         Ok(MaterialEntry { name: name.to_string(), surface, at: m.at() })
     });
     entries.collect()
+}
+
+/// Clear glass, water, air: refraction, and absorption if there is any.
+fn dielectric(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
+    m.only("a dielectric material", &["type", "sigma_a", "eta", "per"])?;
+    let eta = m.need("eta", ETA, refractive_index)? as f32;
+    let per = m.get("per", UNIT, unit)?;
+    let sigma_a = m.get("sigma_a", COEFFICIENT, |n| colour(n, |v| v >= 0.0))?.unwrap_or([0.0; 3]);
+    let sigma_a = rgb(sigma_a.map(|v| per.map_or(v, |per| v * (unit_in_mm / per))));
+    let medium = Medium { sigma_a, sigma_s: Rgb::BLACK, g: 0.0, eta };
+    let medium = medium.checked().map_err(|e| m.error(format!("{e}; see `per`")))?;
+    Ok(Surface::dielectric(Dielectric { eta, sigma_a: medium.sigma_a }))
+}
+
+fn refractive_index(n: &Node) -> Option<f64> {
+    n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0)
 }
 
 fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
@@ -73,7 +90,7 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
     ];
     m.only("a translucent material", &keys)?;
     let scale = m.get("scale", "a number above 0", |n| n.number().filter(|v| *v > 0.0))?.unwrap_or(1.0);
-    let eta = m.get("eta", ETA, |n| n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0))?;
+    let eta = m.get("eta", ETA, refractive_index)?;
     let (mut medium, source) = match m.get("preset", "the name of a measured medium", Node::text)? {
         Some(name) => preset(m, name, unit_in_mm)?,
         None => (numbers(m, unit_in_mm, eta)?, m.at()),

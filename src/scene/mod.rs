@@ -30,11 +30,16 @@ pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread};
-pub use world::{Emission, Material, Object, Scene, Surface, Translucent};
+pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
 
 // For what is above this room.
 #[doc(hidden)]
 pub use self::{
-    camera::Camera, difference::difference, doctor::Remark, environment::Environment, insides::Insides,
-    options::default_photons, view::View,
+    camera::Camera,
+    difference::difference,
+    doctor::Remark,
+    environment::Environment,
+    insides::{Contacts, Insides, Nests},
+    options::default_photons,
+    view::View,
 };

@@ -24,6 +24,8 @@ pub struct ObjectEntry {
     pub normals: NormalsChoice,
     /// Exchange inside and outside.
     pub flip: bool,
+    /// Where bodies overlap, the one of the higher priority is there.
+    pub priority: i32,
     /// From its own space into the scene's [unit]; has an inverse.
     pub transform: DAffine3,
     /// File and line, for messages.
@@ -69,7 +71,9 @@ named! {
     Smooth = "smooth"
 }
 
-const COMMON: [&str; 7] = ["name", "mesh", "shape", "material", "normals", "flip", "transform"];
+const COMMON: [&str; 8] = ["name", "mesh", "shape", "material", "normals", "flip", "priority", "transform"];
+
+const PRIORITY: &str = "a whole number; the higher one wins where bodies overlap";
 
 /// All objects.
 pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<ObjectEntry>> {
@@ -102,6 +106,7 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
             material,
             normals: named_value(o, "normals")?.unwrap_or(NormalsChoice::Auto),
             flip: switch(o, "flip")?.unwrap_or(false),
+            priority: o.get("priority", PRIORITY, |n| n.integer().and_then(|i| i32::try_from(i).ok()))?.unwrap_or(0),
             transform: transform(o)?,
             at: o.at(),
         });

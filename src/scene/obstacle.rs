@@ -10,12 +10,16 @@ pub enum ObstacleKind {
     Crossing,
     /// Two media at one place: one inside the other.
     Nested,
+    /// A body inside a stronger one.
+    Hidden,
     /// Surfaces that lie in each other over an area.
     Touching,
     /// A mesh whose triangles do not share their corners, which lie close together.
     Unwelded,
     /// A surface without an inside.
     Sheet,
+    /// Parts of a mesh that pass through each other, some of them open or looking inwards; an open part in a closed one.
+    Uncounted,
     /// A mesh with holes.
     Holes,
     /// Little of a surface passes through itself or lies inside.
@@ -58,15 +62,20 @@ pub struct Obstacle {
 }
 
 impl Obstacle {
+    /// Whether bodies, or parts of one, are in one place.
+    pub(super) fn overlaps(&self) -> bool {
+        use ObstacleKind::*;
+        matches!(self.kind, Crossing | Nested | Hidden | Touching)
+    }
+
     /// Whether `volume_path` refuses the scene for it, and why.
     pub fn refusal(&self) -> Option<String> {
         use ObstacleKind::*;
         let why = match self.kind {
-            Crossing | Nested => "`volume_path` knows one medium at a place",
-            Touching => "`volume_path` cannot tell which medium comes first",
-            Unwelded | Sheet | Faces | Walls | Turned => "`volume_path` needs an inside",
+            Unwelded | Sheet | Uncounted | Faces | Walls | Turned => "`volume_path` needs an inside",
             LampTouching | CameraTouching => "`volume_path` cannot tell whether that is inside",
-            Holes | Blemish | LampInside | OpaqueTouching | CameraInside | Unknown => return None,
+            Crossing | Nested | Hidden | Touching | Holes | Blemish | LampInside | OpaqueTouching | CameraInside
+            | Unknown => return None,
         };
         Some(self.sentence(why))
     }
@@ -79,16 +88,18 @@ impl Obstacle {
             (_, OpaqueTouching) => "light may pass there from one side to the other",
             (_, Unknown) => "what is inside is not known there",
             _ if self.said => return None,
+            (MethodName::VolumePath, Hidden) => "nothing of it is seen",
             (MethodName::VolumePath, Blemish) => "paths that come there are lost, and counted",
             (MethodName::VolumePath, _) | (_, Blemish) => return None,
-            (_, Crossing | Nested) => {
+            (_, Crossing | Nested | Hidden) => {
                 "`subsurface` lights each surface by itself: what lies inside takes no light, and light does not pass from one to the \
-                 other"
+                 other; take --method volume_path"
             }
             (_, Touching) => {
-                "`subsurface` lets no light pass between them, and the faces that touch stay dark or not by chance"
+                "`subsurface` lets no light pass between them, and the faces that touch stay dark or not by chance; take \
+                 --method volume_path"
             }
-            (_, Unwelded | Holes | Sheet) => {
+            (_, Unwelded | Holes | Sheet | Uncounted) => {
                 "`subsurface` takes it for the skin of a thick body: what enters on one side does not leave on the other"
             }
             (_, Faces | Walls | Turned) => "`subsurface` lights each face as if the outside were before it",

@@ -1,9 +1,9 @@
 //! What stands in the way of knowing which medium is where: bodies in one another, surfaces that touch, meshes without an inside, lamps
 //! and cameras in media. Read first: [`Obstacle`] and [`Found::new`]; docs/robustness.md has the table.
 
-use super::insides::Found;
+use super::insides::{Found, Nests, Partner};
 use super::{Object, Obstacle, ObstacleKind, Scene};
-use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, meeting, mended};
+use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, lying, meeting, mended};
 use crate::math::{Aabb, DVec3};
 use crate::words::{self, counted, either, percent};
 
@@ -29,9 +29,14 @@ impl Scene {
         &self.insides.0.get_or_init(|| Found::new(self)).obstacles
     }
 
-    /// The translucent object that the camera stands in.
-    pub fn camera_in(&self) -> Option<u32> {
-        self.insides.0.get_or_init(|| Found::new(self)).camera_in
+    /// The bodies that the camera stands in, each with how often its surface is around it.
+    pub fn camera_in(&self) -> &[(u32, u32)] {
+        &self.insides.0.get_or_init(|| Found::new(self)).camera_in
+    }
+
+    /// Which body is where bodies overlap or touch.
+    pub fn nests(&self) -> &Nests {
+        &self.insides.0.get_or_init(|| Found::new(self)).nests
     }
 }
 
@@ -57,7 +62,7 @@ impl Found {
     /// Looks at every translucent object, alone and with all that comes near it; at nothing else.
     pub(super) fn new(scene: &Scene) -> Self {
         let role = |o: &Object| match &scene.materials[o.material].surface {
-            surface if surface.is_translucent() => Role::Medium,
+            surface if surface.is_body() => Role::Medium,
             surface if surface.shines() => Role::Lamp,
             _ => Role::Opaque,
         };
@@ -92,22 +97,50 @@ impl Found {
                 wanted.then(|| Body { index, object, kind, solid: Solid::new(&object.mesh), bounds, share })
             })
             .collect();
-        let mut found = Self::default();
+        let nests = Nests { meets: vec![false; scene.objects.len()], ..ranks(scene, &bodies) };
+        let mut found = Self { nests, ..Self::default() };
         for body in bodies.iter().flatten().filter(|b| b.kind == Role::Medium) {
+            let before = found.obstacles.len();
             let solid = alone(scene, body, &mut found.obstacles);
             found.look_from(scene, body, solid);
+            found.nests.meets[body.index as usize] = found.obstacles[before..].iter().any(|o| o.overlaps());
         }
         let (mut meet, mut meets) = (0, vec![false; bodies.len()]);
         for (i, j) in pairs {
-            if let (Some(a), Some(b)) = (&bodies[i], &bodies[j])
-                && !(meet > MOST_MEETINGS && meets[i] && meets[j])
-                && let Some(obstacle) = pair(scene, a, b)
-            {
+            let (Some(a), Some(b)) = (&bodies[i], &bodies[j]) else { continue };
+            if meet > MOST_MEETINGS && meets[i] && meets[j] {
+                if b.kind == Role::Medium {
+                    found.join(a, b);
+                }
+            } else if let Some(obstacle) = pair(scene, a, b, &found.nests) {
                 (meet, meets[i], meets[j]) = (meet + 1, true, true);
+                if obstacle.overlaps() {
+                    found.join(a, b);
+                }
                 found.obstacles.push(obstacle);
             }
         }
+        for body in bodies.iter().flatten().filter(|b| b.solid.parts.len() > 1) {
+            if found.nests.meets[body.index as usize] {
+                found.join(body, body);
+            }
+        }
         found
+    }
+
+    /// Two bodies that meet, or one that meets itself: which of their faces lie in each other.
+    fn join(&mut self, a: &Body<'_>, b: &Body<'_>) {
+        let gap = gap(a.share, &a.bounds, &b.bounds);
+        let nests = &mut self.nests;
+        (nests.meets[a.index as usize], nests.meets[b.index as usize]) = (true, true);
+        for pair in lying(&a.solid, &b.solid, gap).unwrap_or_default() {
+            nests.gap = nests.gap.max(gap);
+            for (one, other, k) in [(a, b, 0), (b, a, 1)] {
+                let [own, there] = [pair.triangles[k], pair.triangles[1 - k]];
+                let partner = Partner { object: other.index, part: pair.parts[1 - k], triangle: there };
+                nests.contacts[one.index as usize].entry(own).or_default().push(partner);
+            }
+        }
     }
 
     /// Whether the camera is in a body.
@@ -130,12 +163,24 @@ impl Found {
                 what,
                 format!("move it by more than {gap:.1e} units"),
             ));
-        } else if solid && body.solid.winding(camera, |_| true).is_some_and(|w| w != 0) {
-            self.camera_in = Some(body.index);
+        } else if solid && let Some(winding) = body.solid.winding(camera, |_| true).filter(|w| *w != 0) {
+            self.camera_in.push((body.index, winding.unsigned_abs()));
             let what = format!("the camera stands inside object {name:?}");
             self.obstacles.push(obstacle(ObstacleKind::CameraInside, what, String::new()));
         }
     }
+}
+
+/// The order of bodies; no contacts yet.
+fn ranks(scene: &Scene, bodies: &[Option<Body<'_>>]) -> Nests {
+    let media = bodies.iter().flatten().filter(|b| b.kind == Role::Medium);
+    let mut order: Vec<(i32, f64, u32)> =
+        media.map(|b| (b.object.priority, -b.object.mesh.volume(), b.index)).collect();
+    order.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let mut nests = Nests { rank: vec![0; scene.objects.len()], ..Nests::default() };
+    nests.contacts.resize_with(scene.objects.len(), Default::default);
+    (0..).zip(order).for_each(|(rank, (.., index))| nests.rank[index as usize] = rank);
+    nests
 }
 
 /// Distance [unit] below which surfaces within the two boxes are as good as in one place.
@@ -238,14 +283,17 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
     let found = meeting(solid, solid, gap, Seek::Crossing, |[a, b]| a != b && large(a) && large(b));
     let all = parts.len();
     let union = "make one surface of them (a union), or cut one out of the other";
+    // How often the surface is around a place tells nothing with open parts, and with some that look inwards.
+    let counts = parts.iter().all(|p| p.closed && p.volume > 0.0);
+    let countable = |kind| if counts { kind } else { ObstacleKind::Uncounted };
     if let Some(c) = &found.crossing {
         let what = format!("two of its {all} parts overlap: they pass through each other {}", near(scene, c, gap));
-        return say(ObstacleKind::Crossing, what, union);
+        return say(countable(ObstacleKind::Crossing), what, union);
     }
     if let Some(c) = &found.touching {
         let what = format!("two of its {all} parts touch: faces lie in each other {}", near(scene, c, gap));
         let remedy = format!("join them without the faces between, or leave a gap of at least {gap:.1e} units");
-        say(ObstacleKind::Touching, what, &remedy);
+        say(countable(ObstacleKind::Touching), what, &remedy);
     }
     if found.unfinished {
         let what = format!("too many faces of its {all} parts are in one place to look at all");
@@ -300,11 +348,19 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
     let all = parts.len();
     let cavity = "remove them, or make them cavities: closed, their faces turned inwards";
     let inside = [
-        (nested, ["lies inside another part, and looks outwards", "lie inside another part, and look outwards"]),
-        (open, ["is open and lies inside a closed one", "are open and lie inside a closed one"]),
+        (
+            ObstacleKind::Nested,
+            nested,
+            ["lies inside another part, and looks outwards", "lie inside another part, and look outwards"],
+        ),
+        (
+            ObstacleKind::Uncounted,
+            open,
+            ["is open and lies inside a closed one", "are open and lie inside a closed one"],
+        ),
     ];
-    for ((count, part), [one, many]) in inside {
-        let kind = if part > MINOR * area { ObstacleKind::Nested } else { ObstacleKind::Blemish };
+    for (kind, (count, part), [one, many]) in inside {
+        let kind = if part > MINOR * area { kind } else { ObstacleKind::Blemish };
         if count > 0 {
             say(kind, format!("{count} of its {all} parts {}", either(count, one, many)), cavity);
         }
@@ -321,7 +377,7 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
 }
 
 /// What is wrong with a medium `a` and another object.
-fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> Option<Obstacle> {
+fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obstacle> {
     let gap = gap(a.share, &a.bounds, &b.bounds);
     let (one, other) = (&a.object.name, &b.object.name);
     let obstacle = |kind, what: String, remedy: String| {
@@ -362,35 +418,55 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> Option<Obstacle> {
             let union = "move them apart, cut one out of the other and leave a gap, or make one mesh of both (a union)";
             if let Some(c) = found.crossing {
                 let what = format!(
-                    "the translucent objects {one:?} and {other:?} overlap: they pass through each other {}",
+                    "{} {one:?} and {other:?} overlap: they pass through each other {}",
+                    kinds(scene, a, b),
                     near(scene, &c, gap)
                 );
                 return obstacle(ObstacleKind::Crossing, what, union.into());
             }
             if let Some(c) = found.touching {
                 let what = format!(
-                    "the translucent objects {one:?} and {other:?} touch: faces lie in each other {}",
+                    "{} {one:?} and {other:?} touch: faces lie in each other {}",
+                    kinds(scene, a, b),
                     near(scene, &c, gap)
                 );
                 let remedy = format!("{apart}, or join them into one mesh without the faces between");
                 return obstacle(ObstacleKind::Touching, what, remedy);
             }
             let (outer, inner) = match (holds(&a.solid, &b.solid), holds(&b.solid, &a.solid)) {
-                (true, _) => (one, other),
-                (_, true) => (other, one),
+                (true, _) => (a, b),
+                (_, true) => (b, a),
                 _ if found.unfinished => {
                     let what = format!(
-                        "the translucent objects {one:?} and {other:?} have too many faces in one place to look at all"
+                        "{} {one:?} and {other:?} have too many faces in one place to look at all",
+                        kinds(scene, a, b)
                     );
                     return obstacle(ObstacleKind::Unknown, what, String::new());
                 }
                 _ => return None,
             };
+            let (outside, inside) = (&outer.object.name, &inner.object.name);
             let what =
-                format!("the translucent objects {one:?} and {other:?} overlap: {inner:?} lies inside {outer:?}");
+                format!("{} {one:?} and {other:?} overlap: {inside:?} lies inside {outside:?}", kinds(scene, a, b));
+            let hidden = nests.rank[inner.index as usize] < nests.rank[outer.index as usize];
+            if hidden && bodies_in(&inner.solid, &outer.solid) {
+                let remedy = format!("give {inside:?} a priority above {}", outer.object.priority);
+                return obstacle(ObstacleKind::Hidden, what, remedy);
+            }
             obstacle(ObstacleKind::Nested, what, union.into())
         }
     }
+}
+
+/// What two bodies are.
+fn kinds(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> &'static str {
+    let translucent = |body: &Body<'_>| scene.surface(body.index).is_translucent();
+    if translucent(a) && translucent(b) { "the translucent objects" } else { "the bodies" }
+}
+
+/// Whether all of `inner` is inside `outer`, where their surfaces do not cross.
+fn bodies_in(inner: &Solid, outer: &Solid) -> bool {
+    (0..inner.parts.len()).all(|i| outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0))
 }
 
 /// Whether a part of `inner` is inside `outer`, where their surfaces do not cross.

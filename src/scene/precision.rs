@@ -62,14 +62,16 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         }
     }
     for (number, object) in objects.iter().enumerate() {
-        let Some(t) = &materials[object.material].surface.inside else { continue };
+        let surface = &materials[object.material].surface;
+        let Some(medium_inside) = surface.medium() else { continue };
         let (other, farthest) = worst.iter().find(|w| w.0 != number).copied().unwrap_or((number, 0.0));
         let Some(probes) = probes(object, farthest / CONTACT) else { continue };
         let name = &object.name;
-        let (absorbed, sigma) = (t.medium.sigma_a, t.medium.sigma_t_prime());
+        let (absorbed, sigma) = (medium_inside.sigma_a, medium_inside.sigma_t_prime());
         let path = 1.0 / f64::from(sigma.max());
         let decay = (0..3).map(|c| (3.0 * f64::from(absorbed[c]) * f64::from(sigma[c])).sqrt()).fold(0.0, f64::max);
-        let limit = if walks(t) { (DENSE * path).min(THIN / decay) } else { f64::INFINITY };
+        let limit =
+            if surface.inside.as_ref().is_some_and(&walks) { (DENSE * path).min(THIN / decay) } else { f64::INFINITY };
         let medium = || format!("{} units, and light falls by 1/e over {}", short(path), short(1.0 / decay));
         let why = if let Some((share, thickness)) = thinner(&probes, |p| p.offset / THIN) {
             Some(format!(

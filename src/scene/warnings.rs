@@ -29,6 +29,8 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
         let head = format!("{}: material {:?}", entry.at, entry.name);
         if !used[i] {
             said.push(format!("{head} is used by no object"));
+        } else if scene.materials[i].surface.clear.is_some() {
+            said.extend(clear(file, scene).map(|what| format!("{head}: {what}")));
         } else if let Some(t) = &scene.materials[i].surface.inside {
             let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
             if models_are_used(file) {
@@ -37,6 +39,13 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             }
         }
     }
+}
+
+/// What the method makes of a clear body.
+fn clear(file: &SceneFile, scene: &Scene) -> Option<String> {
+    let method = file.method.name.unwrap_or_else(|| scene.default_method());
+    matches!(method, MethodName::Subsurface | MethodName::Direct)
+        .then(|| format!("`{}` shows it black and lets no light through; take --method volume_path", method.name()))
 }
 
 /// Whether a BSSRDF is what decides of a translucent material.

@@ -48,6 +48,8 @@ pub struct Object {
     pub flipped: bool,
     /// What is wrong with the mesh.
     pub findings: Findings,
+    /// Where bodies overlap, the one of the higher priority is there.
+    pub priority: i32,
 }
 
 /// A surface by name.
@@ -68,6 +70,17 @@ pub struct Surface {
     pub emission: Option<Emission>,
     /// The scattering medium where the outward normal does not point; of a translucent body.
     pub inside: Option<Translucent>,
+    /// What is there of a clear body, which `volume_path` alone shows.
+    pub clear: Option<Dielectric>,
+}
+
+/// The inside of a clear body: it refracts and absorbs, but does not scatter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Dielectric {
+    /// Refractive index, that of air being 1.
+    pub eta: f32,
+    /// Absorption [1/unit].
+    pub sigma_a: Rgb,
 }
 
 /// Constant radiance of a lamp.
@@ -82,27 +95,44 @@ pub struct Emission {
 impl Surface {
     /// Lambertian, both sides alike; `albedo` in [0, 1].
     pub fn diffuse(albedo: Rgb) -> Self {
-        Self { bsdf: Arc::new(Lambertian { albedo }), emission: None, inside: None }
+        Self { bsdf: Arc::new(Lambertian { albedo }), emission: None, inside: None, clear: None }
     }
 
     /// A lamp, which reflects nothing.
     pub fn emissive(emission: Emission) -> Self {
-        Self { bsdf: Arc::new(Lambertian::BLACK), emission: Some(emission), inside: None }
+        Self { bsdf: Arc::new(Lambertian::BLACK), emission: Some(emission), inside: None, clear: None }
     }
 
     /// A scattering medium behind a smooth boundary.
     pub fn translucent(inside: Translucent) -> Self {
-        Self { bsdf: Arc::new(Boundary { eta: inside.medium.eta }), emission: None, inside: Some(inside) }
+        let bsdf = Arc::new(Boundary { eta: inside.medium.eta });
+        Self { bsdf, emission: None, inside: Some(inside), clear: None }
     }
 
-    /// Whether light goes in.
+    /// A clear body behind a smooth boundary.
+    pub fn dielectric(clear: Dielectric) -> Self {
+        Self { bsdf: Arc::new(Boundary { eta: clear.eta }), emission: None, inside: None, clear: Some(clear) }
+    }
+
+    /// What fills the body behind it; of translucent and clear bodies.
+    pub fn medium(&self) -> Option<Medium> {
+        let clear = |c: &Dielectric| Medium { sigma_a: c.sigma_a, sigma_s: Rgb::BLACK, g: 0.0, eta: c.eta };
+        self.inside.as_ref().map(|t| t.medium).or_else(|| self.clear.as_ref().map(clear))
+    }
+
+    /// Whether it bounds a body of some medium, translucent or clear.
+    pub fn is_body(&self) -> bool {
+        self.inside.is_some() || self.clear.is_some()
+    }
+
+    /// Whether light goes in and is scattered there.
     pub fn is_translucent(&self) -> bool {
         self.inside.is_some()
     }
 
     /// Whether it is neither a lamp nor the boundary of a body.
     pub fn is_opaque(&self) -> bool {
-        self.emission.is_none() && self.inside.is_none()
+        self.emission.is_none() && !self.is_body()
     }
 
     /// Whether it sends out any light.

@@ -88,6 +88,16 @@ fn refuses(scene: &Scene, kind: ObstacleKind, words: &[&str]) {
     }
 }
 
+/// Told of `subsurface`, the method of the file, with all of `words`; by paths a white furnace is white.
+fn meets(scene: &Scene, kind: ObstacleKind, words: &[&str]) {
+    assert!(scene.obstacles().iter().any(|o| o.kind == kind), "{:?}", scene.obstacles());
+    let said = scene.warnings.join("\n");
+    for word in words {
+        assert!(said.contains(word), "`{word}` in {said}");
+    }
+    white(scene);
+}
+
 fn two(a: String, b: String) -> Scene {
     scene_of(&[a, b], WHITE, "").unwrap()
 }
@@ -98,40 +108,40 @@ fn two_bodies_apart_ok() {
 }
 
 #[test]
-fn two_crossed_bars_refused() {
+fn two_crossed_bars_ok() {
     let bar = |half| cuboid([0.0; 3], half, 0, false);
     let scene = two(bar([3.0, 0.5, 0.5]), bar([0.4, 3.0, 0.4]));
-    refuses(&scene, ObstacleKind::Crossing, &["\"a\"", "\"b\"", "overlap", "a union"]);
+    meets(&scene, ObstacleKind::Crossing, &["\"a\"", "\"b\"", "overlap", "a union"]);
     // With faces in one plane.
     let scene = two(bar([3.0, 0.5, 0.5]), bar([0.5, 3.0, 0.5]));
-    refuses(&scene, ObstacleKind::Crossing, &["\"a\"", "\"b\"", "overlap"]);
+    meets(&scene, ObstacleKind::Crossing, &["\"a\"", "\"b\"", "overlap"]);
 }
 
 #[test]
-fn two_halves_that_touch_refused() {
-    refuses(&two(cube(-1.0), cube(1.0)), ObstacleKind::Touching, &["\"a\"", "\"b\"", "touch", "a gap of at least"]);
+fn two_halves_that_touch_ok() {
+    meets(&two(cube(-1.0), cube(1.0)), ObstacleKind::Touching, &["\"a\"", "\"b\"", "touch", "a gap of at least"]);
     let smaller = cuboid([1.0, 0.2, 0.1], [1.0, 0.3, 0.4], 0, false);
-    refuses(&two(cube(-1.0), smaller), ObstacleKind::Touching, &["\"a\"", "\"b\"", "touch", "join them"]);
+    meets(&two(cube(-1.0), smaller), ObstacleKind::Touching, &["\"a\"", "\"b\"", "touch", "join them"]);
 }
 
 /// The gap that the message asks for is enough.
 #[test]
 fn two_halves_with_the_gap_that_is_asked_for_ok() {
-    let refusal = traceable(&two(cube(-1.0), cube(1.0)))[0].refusal().unwrap();
+    let refusal = two(cube(-1.0), cube(1.0)).warnings.join("\n");
     let gap: f64 = refusal.split("at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(gap < 1e-4, "{refusal}");
     white(&two(cube(-1.0), cube(1.0 + 1.05 * gap)));
 }
 
 #[test]
-fn equal_bodies_in_one_place_refused() {
-    refuses(&two(cube(0.0), cube(0.0)), ObstacleKind::Crossing, &["\"a\"", "\"b\"", "overlap"]);
+fn equal_bodies_in_one_place_ok() {
+    meets(&two(cube(0.0), cube(0.0)), ObstacleKind::Crossing, &["\"a\"", "\"b\"", "overlap"]);
 }
 
 #[test]
-fn one_body_in_another_refused() {
+fn one_body_in_another_ok() {
     let core = cuboid([0.1, 0.0, 0.0], [0.3; 3], 0, false);
-    refuses(&two(cube(0.0), core), ObstacleKind::Nested, &["\"b\" lies inside \"a\"", "cut one out of the other"]);
+    meets(&two(cube(0.0), core), ObstacleKind::Nested, &["\"b\" lies inside \"a\"", "cut one out of the other"]);
 }
 
 #[test]
@@ -145,9 +155,9 @@ fn one(mesh: String, medium: &str) -> Scene {
 }
 
 #[test]
-fn overlapping_parts_of_a_mesh_refused() {
+fn overlapping_parts_of_a_mesh_ok() {
     let second = cuboid([0.5, 0.3, 0.2], [1.0; 3], 8, false);
-    refuses(
+    meets(
         &one(cube(0.0) + &second, WHITE),
         ObstacleKind::Crossing,
         &["\"a\"", "two of its 2 parts overlap", "a union"],
@@ -155,16 +165,16 @@ fn overlapping_parts_of_a_mesh_refused() {
 }
 
 #[test]
-fn parts_of_a_mesh_that_touch_refused() {
+fn parts_of_a_mesh_that_touch_ok() {
     let second = cuboid([2.0, 0.3, 0.2], [1.0, 0.5, 0.5], 8, false);
-    refuses(&one(cube(0.0) + &second, WHITE), ObstacleKind::Touching, &["\"a\"", "two of its 2 parts touch", "a gap"]);
+    meets(&one(cube(0.0) + &second, WHITE), ObstacleKind::Touching, &["\"a\"", "two of its 2 parts touch", "a gap"]);
 }
 
 #[test]
-fn nested_parts_that_look_outwards_refused() {
+fn nested_parts_that_look_outwards_ok() {
     let core = cuboid([0.0; 3], [0.5; 3], 8, false);
     let scene = one(cube(0.0) + &core, WHITE);
-    refuses(&scene, ObstacleKind::Nested, &["\"a\"", "1 of its 2 parts lies inside another part", "cavities"]);
+    meets(&scene, ObstacleKind::Nested, &["\"a\"", "1 of its 2 parts lies inside another part", "cavities"]);
 }
 
 /// White, and exp(-σ_a d) through what is solid of a box with a cavity.
@@ -190,7 +200,7 @@ fn straight_down(scene: &Scene) -> marmor::scene::Camera {
 fn an_open_part_that_pokes_into_a_closed_one_refused() {
     let mut lens = cuboid([0.0, 0.0, 1.0], [0.3, 0.3, 0.4], 8, false);
     lens = lens.lines().filter(|l| *l != "f 9 11 12 10").map(|l| format!("{l}\n")).collect();
-    refuses(&one(cube(0.0) + &lens, WHITE), ObstacleKind::Crossing, &["\"a\"", "two of its 2 parts overlap"]);
+    refuses(&one(cube(0.0) + &lens, WHITE), ObstacleKind::Uncounted, &["\"a\"", "two of its 2 parts overlap"]);
 }
 
 #[test]
@@ -352,7 +362,7 @@ fn from(position: &str, medium: &str) -> Scene {
 #[test]
 fn a_camera_inside_a_body_ok() {
     let scene = from("[0, 0, 0]", "sigma_s = 0\nsigma_a = 1\ng = 0\neta = 1");
-    assert_eq!((traceable(&scene), scene.camera_in()), (vec![], Some(0)));
+    assert_eq!((traceable(&scene), scene.camera_in()), (vec![], &[(0, 1)][..]));
     // The triangles lie up to 1.2e-3 inside the ball.
     is(&scene, (-0.9994_f64).exp());
     white(&from("[0, 0, 0]", "sigma_s = 1\nsigma_a = 0\ng = 0\neta = 1"));
@@ -372,19 +382,20 @@ fn a_camera_in_the_surface_of_a_body_refused() {
 
 /// Each of them is named, but not each of twenty thousand pairs.
 #[test]
-fn hundreds_of_bodies_in_one_place_refused() {
+fn hundreds_of_bodies_in_one_place_ok() {
     let mut text =
-        "unit = \"mm\"\n[camera]\nposition = [0.3, 0.2, 9]\nlook_at = [0, 0, 0]\nfov = 20\nresolution = [8, 8]\n\
+        "unit = \"mm\"\n[camera]\nposition = [0.3, 0.2, 9]\nlook_at = [0, 0, 0]\nfov = 20\nresolution = [8, 8]\n[environment]\nradiance = 1\n\
                     [material.wax]\ntype = \"translucent\"\nsigma_s = 1\nsigma_a = 0\ng = 0\neta = 1.3\n"
             .to_string();
-    let all = 200;
+    let all = 60;
     for i in 0..all {
         text += &format!("[[object]]\nname = \"{i}\"\nmesh = \"a.obj\"\nmaterial = \"wax\"\n");
     }
     let scene = load_with(&text, &[("a.obj", &cube(0.0))], false).unwrap();
-    let found = traceable(&scene);
+    let found = scene.obstacles();
     assert!(found.len() < 1000 + all + 2, "{}", found.len());
     for i in 0..all {
         assert!(found.iter().any(|o| o.objects.contains(&i.to_string())), "{i}");
     }
+    white(&scene);
 }

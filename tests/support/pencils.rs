@@ -100,6 +100,7 @@ impl Body {
                 material: 0,
                 flipped: false,
                 findings: Findings::default(),
+                priority: 0,
             }],
             materials: vec![Material { name: "body".into(), surface: Surface::translucent(translucent) }],
             environment: Rgb::BLACK.into(),

@@ -9,7 +9,7 @@ use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
-use crate::scene::Surface;
+use crate::scene::{Contacts, Surface};
 use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
 
@@ -33,6 +33,12 @@ pub struct Body {
     pub leak: Cause,
     /// Collisions between two looks at the weight.
     pub patience: u32,
+    /// Whether paths keep what is around them, by `nesting.rs`: it is clear, or meets other bodies or itself.
+    pub nested: bool,
+    /// Absorption [1/unit] of a clear body, which has no collisions: its `medium` is void.
+    pub absorbs: Option<Rgb>,
+    /// Its triangles that lie in those of other bodies.
+    pub contacts: Contacts,
 }
 
 /// The straight flight between two collisions.
@@ -89,7 +95,7 @@ impl Straight {
 /// carry more than it, without a bound on its variance.
 pub const MOST_SURFACES: u32 = 100_000;
 /// A path that has lost more than this part of its weight goes on by chance.
-const ROULETTE_BELOW: f32 = 0.25;
+pub const ROULETTE_BELOW: f32 = 0.25;
 
 /// What ends a flight, and after which length.
 pub enum Flight {
@@ -122,6 +128,9 @@ impl Body {
             clearance,
             endless: false,
             leak: Cause::Rounding,
+            nested: false,
+            absorbs: None,
+            contacts: Contacts::new(),
         }
     }
 
@@ -166,7 +175,7 @@ impl Body {
         }
         match &view.scene.materials[object.material].surface {
             Surface { emission: Some(_), .. } => Flight::Lamp(hit),
-            Surface { inside: Some(_), .. } => Flight::Lost(Cause::OtherMedium),
+            surface if surface.is_body() => Flight::Lost(Cause::OtherMedium),
             Surface { bsdf, .. } => Flight::Opaque(at.facing(-w), hit.t, bsdf.albedo()),
         }
     }

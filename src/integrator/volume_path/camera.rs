@@ -5,6 +5,7 @@ use super::body::{Body, Edge, MOST_SURFACES, Straight, Watch, survives};
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
+use super::nesting::{self, Entry, Guide};
 use super::spectrum::Spectrum;
 use super::through::{drawn_light, share_by_chance, sun_share_by_chance};
 use crate::geometry::SurfacePoint;
@@ -179,11 +180,11 @@ impl<'a> CameraPath<'a> {
                 self.add_lamp(hit, direction, share);
                 None
             }
-            Surface { inside: None, bsdf, .. } => {
+            surface @ Surface { bsdf, .. } if surface.is_opaque() => {
                 (self.left, self.stepped) = (None, false);
                 self.reflect(&at, -direction, &**bsdf)
             }
-            Surface { bsdf, .. } => {
+            Surface { .. } => {
                 (self.left, self.stepped) = (None, false);
                 if let Some(surface) = &self.method.stand_ins[hit.mesh as usize] {
                     return self.reflect(&at, -direction, surface);
@@ -192,25 +193,38 @@ impl<'a> CameraPath<'a> {
                     return self.meet_modelled(hit, &at, direction);
                 }
                 self.direct = self.other;
-                let body = self.method.bodies[hit.mesh as usize].as_ref()?;
-                if !self.faces(body, hit, direction) || self.other <= 0.0 {
+                let entry = self.entry(hit, direction)?;
+                if self.other <= 0.0 {
                     return None;
                 }
                 self.by_bsdf = None;
-                let w = bsdf.sample(&at, -direction, [self.draws.number(), 0.0, 0.0])?.wi;
-                if w.dot(at.n_geometric) < 0.0 { self.inside(body, &at, w) } else { Some(Ray::new(at.leave(w), w)) }
+                let w = self
+                    .view
+                    .scene
+                    .surface(entry.body.object)
+                    .bsdf
+                    .sample(&at, -direction, [self.draws.number(), 0.0, 0.0])?
+                    .wi;
+                if w.dot(at.n_geometric) < 0.0 { self.inside(entry, &at, w) } else { Some(Ray::new(at.leave(w), w)) }
             }
         }
     }
 
-    /// Whether a body is met from outside; at the inner side of a face the path is lost, and counted.
-    pub fn faces(&mut self, body: &Body, hit: &Hit, direction: Vec3) -> bool {
-        let n = self.view.scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
-        let outside = n.dot(direction) < 0.0;
-        if !outside {
+    /// The way into a body that is met; at the inner side of a face the path is lost, and counted.
+    pub fn entry(&mut self, hit: &Hit, direction: Vec3) -> Option<Entry<'a>> {
+        let bodies = &self.method.bodies;
+        let body = bodies[hit.mesh as usize].as_ref()?;
+        let way = self.faces(hit, direction).then(|| Entry::at(self.view, bodies, body, hit, direction)).flatten();
+        if way.is_none() {
             self.lose(body.object, body.leak);
         }
-        outside
+        way
+    }
+
+    /// Whether a body is met from outside.
+    fn faces(&self, hit: &Hit, direction: Vec3) -> bool {
+        let n = self.view.scene.objects[hit.mesh as usize].mesh.geometric_normal(hit.triangle);
+        n.dot(direction) < 0.0
     }
 
     fn lose(&mut self, object: u32, cause: Cause) {
@@ -258,21 +272,30 @@ impl<'a> CameraPath<'a> {
         (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
-    /// Through a body from `at`, refracted into `w`; the ray on which the path leaves it.
-    pub fn inside(&mut self, body: &'a Body, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
-        self.through(body, at.leave(w), w)
+    /// Through bodies from `at`, refracted into `w`; the ray on which the path leaves them.
+    pub fn inside(&mut self, entry: Entry<'a>, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
+        let from = SurfacePoint { error: at.error.max(entry.margin), ..*at }.leave(w);
+        self.through(entry, from, w)
     }
 
-    /// Through a body from `from`, inside, along `w`; the ray on which the path leaves it.
-    pub fn through(&mut self, body: &'a Body, from: DVec3, w: Vec3) -> Option<Ray> {
+    /// Through bodies from `from`, inside, along `w`; the ray on which the path leaves them.
+    pub fn through(&mut self, entry: Entry<'a>, from: DVec3, w: Vec3) -> Option<Ray> {
+        let Entry { body, stack, through, .. } = entry;
         let (mut spectrum, mut draws) = (self.spectrum, self.draws.clone());
         let mut walks = WalkTally::default();
         let view = self.view;
-        let mut watch = Gather { path: self, body };
-        let exit = body.walk(view, (from, w), &mut spectrum, &mut draws, &mut watch, &mut walks);
+        let bodies = &self.method.bodies;
+        let left = if body.nested {
+            let mut guide = Nested(self);
+            nesting::walk(view, bodies, ((stack, through), from, w), &mut spectrum, &mut draws, &mut guide, &mut walks)
+        } else {
+            let mut watch = Gather { path: self, body, lit: true };
+            let exit = body.walk(view, (from, w), &mut spectrum, &mut draws, &mut watch, &mut walks);
+            exit.map(|exit| (body, exit))
+        };
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
-        let exit = exit?;
+        let (body, exit) = left?;
         self.by_bsdf = None;
         self.left = Some((body, exit.straight));
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
@@ -283,6 +306,17 @@ impl<'a> CameraPath<'a> {
 struct Gather<'a, 'b> {
     path: &'a mut CameraPath<'b>,
     body: &'a Body,
+    /// Whether lamps are asked for.
+    lit: bool,
+}
+
+/// A path through bodies in one another.
+struct Nested<'a, 'b>(&'a mut CameraPath<'b>);
+
+impl Guide for Nested<'_, '_> {
+    fn watch<'a>(&'a mut self, body: &'a Body, lit: bool) -> impl Watch + 'a {
+        Gather { path: self.0, body, lit }
+    }
 }
 
 impl Watch for Gather<'_, '_> {
@@ -310,7 +344,7 @@ impl Watch for Gather<'_, '_> {
             return path.other > 0.0;
         }
         let orders = path.method.options.orders;
-        if let Some(through) = path.method.through(body).filter(|_| orders.contains(path.order)) {
+        if let Some(through) = path.method.through(body).filter(|_| self.lit && orders.contains(path.order)) {
             let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut *path.tally);
             let lights = &path.method.light.lights;
             for group in lights.asked() {
@@ -361,10 +395,9 @@ impl Orders {
 }
 
 /// Both parts of what the camera sees on a body: the mirror image of what is around it, and the light from inside.
-pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) {
-    if !path.faces(body, hit, direction) {
-        return;
-    }
+pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
+    let Some(entry) = path.entry(hit, direction) else { return };
+    let body = entry.body;
     let (spectrum, draws) = (path.spectrum, path.draws.clone());
     if path.method.options.specular {
         let at = path.view.point(hit, direction);
@@ -376,13 +409,14 @@ pub fn both_parts<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, dire
     }
     (path.spectrum, path.draws) = (spectrum, draws);
     (path.direct, path.other, path.order, path.by_bsdf) = (1.0, 1.0, 0, None);
-    if let Some(ray) = enter(path, body, hit, direction) {
+    if let Some(ray) = enter(path, entry, hit, direction) {
         path.trace(ray);
     }
 }
 
-/// From the camera into a body and through it; the ray on which the path leaves.
-pub fn enter<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction: Vec3) -> Option<Ray> {
+/// From the camera into bodies and through them; the ray on which the path leaves.
+pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, direction: Vec3) -> Option<Ray> {
+    let body = entry.body;
     let at = path.view.point(hit, direction);
     let n = shading_normal(body, &at, direction);
     let passed = transmittance(body.eta, -n.dot(direction));
@@ -390,7 +424,7 @@ pub fn enter<'a>(path: &mut CameraPath<'a>, body: &'a Body, hit: &Hit, direction
         return None;
     }
     path.spectrum.scale(Rgb::splat(passed));
-    path.inside(body, &at, refract(-direction, n, body.eta)?)
+    path.inside(entry, &at, refract(-direction, n, body.eta)?)
 }
 
 /// The normal of both parts. As in `subsurface` what leaves towards the viewer is shaded with the interpolated one, but not

@@ -30,8 +30,8 @@ pub fn warning(scene: &Scene, lights: &Lights) -> Option<String> {
         && f64::from(lights.solid_angle_of_suns()) < SMALL * PI
         && lights.share_beside_suns() < 1.0 - SUNNY;
     for (i, body) in scene.objects.iter().enumerate() {
-        let Some(t) = &scene.materials[body.material].surface.inside else { continue };
-        if !is_clear(&t.medium, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
+        let Some(medium) = scene.materials[body.material].surface.medium() else { continue };
+        if !is_clear(&medium, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
             continue;
         }
         if sun {
@@ -63,7 +63,7 @@ fn is_clear(medium: &Medium, body: &Object) -> bool {
 /// Whether it shows light that comes to it.
 fn receives(scene: &Scene, object: &Object) -> bool {
     match &scene.materials[object.material].surface {
-        Surface { inside: Some(t), .. } => !t.medium.sigma_s.is_black(),
+        surface if surface.is_body() => surface.medium().is_some_and(|m| !m.sigma_s.is_black()),
         Surface { bsdf, .. } => !bsdf.albedo().is_black(),
     }
 }

@@ -15,6 +15,7 @@ mod facets;
 mod modelled;
 #[cfg(test)]
 mod near_checks;
+mod nesting;
 mod pencil;
 mod photons;
 mod spectrum;
@@ -26,6 +27,7 @@ use crate::error::{Error, Result};
 use crate::geometry::{Clearance, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
+use crate::optics::Medium;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
@@ -39,6 +41,7 @@ use cells::Cells;
 pub(super) use connect::Scratch;
 pub(super) use draws::Draws;
 pub(super) use modelled::Modelled;
+use nesting::{Entry, Stack};
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
@@ -75,8 +78,8 @@ pub struct VolumePath {
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps and suns on the body itself, once photons have that.
     persistence: f32,
-    /// The body that the camera stands in.
-    camera_in: Option<u32>,
+    /// The bodies that the camera stands in.
+    camera_in: Stack,
     /// Whether this is [`Self::once`].
     once: bool,
     /// One for each object; for bodies whose light a model has.
@@ -111,7 +114,7 @@ impl VolumePath {
     /// Tables for the translucent objects of `scene`, and for no others.
     ///
     /// # Errors
-    /// What [`super::traceable`] finds: media in one another, surfaces that touch, meshes without an inside.
+    /// What [`super::traceable`] finds: meshes without an inside, lamps and cameras in surfaces.
     pub fn new(scene: &Scene, options: VolumePathOptions) -> Result<Self> {
         let refusals: Vec<String> = scene.obstacles().iter().filter_map(Obstacle::refusal).collect();
         if !refusals.is_empty() {
@@ -124,8 +127,8 @@ impl VolumePath {
         let source = |body: &Option<Body>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
-            let scatters = body.medium.albedo.max() > 0.0;
-            scatters.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
+            let alone = body.medium.albedo.max() > 0.0 && !body.nested;
+            alone.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
         };
         let sources = bodies.iter().map(source).collect();
         let diffuse = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_opaque());
@@ -139,7 +142,7 @@ impl VolumePath {
             bodies,
             sources,
             persistence,
-            camera_in: scene.camera_in(),
+            camera_in: Stack::of(scene.camera_in(), scene.nests()),
             ..Self::surfaces(scene, options)
         })
     }
@@ -154,7 +157,7 @@ impl VolumePath {
             throughs: each.clone().map(|_| None).collect(),
             sources: each.clone().map(|_| None).collect(),
             persistence: 1.0,
-            camera_in: None,
+            camera_in: Stack::default(),
             once: false,
             modelled: vec![None; each.len()],
             stand_ins: vec![None; each.len()],
@@ -180,7 +183,7 @@ impl VolumePath {
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
         match (&self.bodies[hit.mesh as usize], view.scene.surface(hit.mesh)) {
             _ if self.modelled[hit.mesh as usize].is_some() => path.seen(hit, direction),
-            (Some(body), _) => both_parts(&mut path, body, hit, direction),
+            (Some(_), _) => both_parts(&mut path, hit, direction),
             (None, Surface { emission: Some(_), .. }) => {
                 path.radiance = self.of_order_0(emitted(view.scene, hit, direction))
             }
@@ -200,7 +203,8 @@ impl VolumePath {
         body: &'a Body,
     ) -> Rgb {
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
-        if let Some(out) = path.through(body, ray.ray.origin, ray.ray.direction) {
+        let entry = Entry { stack: self.camera_in.clone(), ..Entry::alone(body) };
+        if let Some(out) = path.through(entry, ray.ray.origin, ray.ray.direction) {
             path.trace(out);
         }
         path.radiance
@@ -266,7 +270,7 @@ impl VolumePath {
         let Some(body) = &self.bodies[hit.mesh as usize] else { return Rgb::BLACK };
         let mut scratch = Scratch::default();
         let mut path = self.path(view, &[], ray.stream.split(0, 1), &mut scratch, tally);
-        if let Some(out) = enter(&mut path, body, hit, ray.ray.direction) {
+        if let Some(out) = enter(&mut path, Entry::alone(body), hit, ray.ray.direction) {
             path.meet_light(&out);
         }
         path.radiance
@@ -288,14 +292,22 @@ impl VolumePath {
     }
 }
 
-/// The body of object number `index`, where it is translucent and has a size.
+/// The body of object number `index`, where it is one and has a size.
 fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
     let object = &scene.objects[index];
-    let Some(t) = &scene.materials[object.material].surface.inside else { return None };
-    let bounds = object.mesh.bounds()?;
+    let surface = &scene.materials[object.material].surface;
+    let (medium, bounds) = (surface.medium()?, object.mesh.bounds()?);
+    let clear = surface.clear.as_ref();
+    let cells = if clear.is_some() { 1 } else { cells };
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, bounds, cells);
-    let body = Body::new(index as u32, &t.medium, clearance);
+    let body = match clear {
+        Some(clear) => {
+            let void = Medium { sigma_a: Rgb::BLACK, ..medium };
+            Body { absorbs: Some(clear.sigma_a), ..Body::new(index as u32, &void, clearance) }
+        }
+        None => Body::new(index as u32, &medium, clearance),
+    };
     let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
     let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {
         ObstacleKind::Sheet | ObstacleKind::Holes => Some(Cause::Hole),
@@ -303,13 +315,15 @@ fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
         ObstacleKind::Blemish => Some(Cause::Blemish),
         _ => None,
     });
-    Some(Body { leak: leak.unwrap_or(Cause::Rounding), ..body })
+    let leak = leak.unwrap_or(Cause::Rounding);
+    let (nests, contacts) = (scene.nests(), scene.nests().contacts[index].clone());
+    Some(Body { leak, nested: clear.is_some() || nests.meets[index], contacts, ..body })
 }
 
-/// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault.
+/// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault: the models beside know nothing of them either.
 fn endless_bodies(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Body>> {
-    let endless = |body: Body| Body { endless: true, ..body };
-    let body = |i| if wanted(i) { body(scene, i, 1).map(endless) } else { None };
+    let lone = |body: Body| Body { endless: true, nested: false, ..body };
+    let body = |i| if wanted(i) { body(scene, i, 1).map(lone) } else { None };
     (0..scene.objects.len()).map(body).collect()
 }
 
@@ -337,7 +351,7 @@ impl Integrator for VolumePath {
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let mut scratch = Scratch::default();
-        if let Some(body) = self.camera_in.and_then(|o| self.bodies[o as usize].as_ref()) {
+        if let Some(body) = self.camera_in.top().and_then(|o| self.bodies[o as usize].as_ref()) {
             for (ray, out) in rays.iter().zip(out) {
                 *out = self.shade_inside(view, pass, ray, &mut scratch, tally, body);
             }
@@ -382,6 +396,10 @@ impl Integrator for VolumePath {
                 ),
                 None if !self.light.lights.has_emitters() && !self.light.lights.has_suns() => {
                     let why = "no area light, no sun in a picture: paths meet all light by themselves";
+                    Part::left_out(format!("photons in `{name}`"), why)
+                }
+                None if body.as_ref().is_some_and(|b| b.nested) => {
+                    let why = "it is clear, or meets other bodies: paths meet lamps by themselves";
                     Part::left_out(format!("photons in `{name}`"), why)
                 }
                 None => Part::left_out(format!("photons in `{name}`"), "switched off, or nothing for them to do"),

@@ -4,6 +4,7 @@ use super::body::{Body, Edge, Watch, survives};
 use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
 use super::draws::Draws;
+use super::nesting::Entry;
 use super::spectrum::Spectrum;
 use super::{Asked, VolumePath, VolumePathOptions, endless_bodies, throughs};
 use crate::bssrdf::Exit;
@@ -159,7 +160,7 @@ impl CameraPath<'_> {
         (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws, None);
         if let (Some(body), true) = (self.method.body(hit.mesh), model.walked.is_some()) {
             self.order = 0;
-            if let Some(ray) = enter(self, body, hit, direction) {
+            if let Some(ray) = enter(self, Entry::alone(body), hit, direction) {
                 self.trace(ray);
             }
         }
@@ -197,7 +198,7 @@ impl CameraPath<'_> {
             return self.step(plan, at, w);
         }
         self.order = 0;
-        self.inside(body?, at, refract(w, n, model.eta)?)
+        self.inside(Entry::alone(body?), at, refract(w, n, model.eta)?)
     }
 
     /// From where light leaves along `w` to a place near it where it entered, and out by the cosine: light of lights that the path

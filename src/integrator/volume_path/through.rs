@@ -208,6 +208,10 @@ fn is_open(
     drawn: &LightSample,
     tally: &mut WalkTally,
 ) -> bool {
+    // Behind a face in which another lies there is no air.
+    if body.contacts.contains_key(&crossing.triangle) {
+        return false;
+    }
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     tally.rays += 1;
     if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
