@@ -294,7 +294,7 @@ mod tests {
                 intensity: 10_f64.powf(2.0 * number(5 * i + 3)),
                 normals: Cone { axis: n, half: 0.0 },
                 falloff: 0.5 * PI,
-                two_sided: i % 3 == 0,
+                two_sided: i.is_multiple_of(3),
             }
         };
         (0..n).map(lamp).collect()
