@@ -61,7 +61,7 @@ fn lamps(all_around: bool) -> Vec<Lamp> {
         let to = DVec3::new(side * angle.cos(), y, side * angle.sin());
         let distance = 1.0 + 3.0 * f64::from(number(3 * i)).powi(2);
         let aside = to.any_orthonormal_vector() * f64::from(number(3 * i + 1));
-        let n = (if i % 3 == 0 { to } else { -to } + aside).normalize();
+        let n = (if i.is_multiple_of(3) { to } else { -to } + aside).normalize();
         let u = n.any_orthonormal_vector();
         Lamp { middle: to * distance, edges: [u, n.cross(u)].map(|edge| edge * 0.04 * distance) }
     };
