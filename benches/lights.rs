@@ -36,7 +36,7 @@ fn scene(lamps: u64, half: f32, middle: impl Fn(u64) -> [f32; 3], look: impl Fn(
         let n = Vec3::from_array(look(i)).normalize();
         let u = n.any_orthonormal_vector();
         let (u, v) = (u * half, n.cross(u) * half);
-        let material = if i % 3 == 0 { "dim" } else { "bright" };
+        let material = if i.is_multiple_of(3) { "dim" } else { "bright" };
         writeln!(
             text,
             "[[object]]\nshape = \"rectangle\"\ncentre = {:?}\nedge_u = {:?}\nedge_v = {:?}\nmaterial = \"{material}\"",
