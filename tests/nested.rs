@@ -220,7 +220,7 @@ fn a_camera_and_a_lamp_inside_inner_bodies() {
     // Two interfaces on the way out: from flint to water, from water to air.
     let f = |eta: f64| f64::from(reflectance(eta as f32, 1.0));
     let (inner, outer) = (f(1.8 / 1.33), f(1.33));
-    let passed = halves.map(|[_, sigma, depth]| (-sigma * depth).exp());
+    let passed = halves.map(|[_, sigma, depth]: [f64; 3]| (-sigma * depth).exp());
     let forth = passed[0] * (1.0 - inner) * passed[1] * (1.0 - outer) / (1.0 - passed[1].powi(2) * inner * outer);
     let seen = scene(&eye([0.0, 0.0, 9.0]), &slabs(), &format!("{SLABS}{lamp}"));
     same(mean(&seen, 256), (forth / (1.8 * 1.8), 0.0), "a lamp in flint in water");
