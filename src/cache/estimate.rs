@@ -9,6 +9,18 @@ use crate::tally::GatherTally;
 /// Below this many samples `cut` is the plain vectorised sum, which is then faster than any tree.
 pub const PLAIN_SUM: usize = 1024;
 
+/// How fine a cut is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Detail {
+    /// As the noise of the cache asks for: what a picture shows.
+    Fine,
+    /// What is one of many that are added up.
+    Coarse,
+}
+
+/// The largest share of a coarse sum that one node may be wrong by, at least.
+const COARSE: f32 = 0.3;
+
 /// A cache made ready for one estimator.
 pub struct Gatherer {
     attempted: u32,
@@ -47,7 +59,7 @@ impl Gatherer {
     pub fn gather(
         &self,
         (model, envelope): (&dyn Bssrdf, &Envelope),
-        exits: &[Exit],
+        (exits, detail): (&[Exit], Detail),
         keys: &[u64],
         scratch: &mut Scratch,
         tally: &mut GatherTally,
@@ -57,6 +69,9 @@ impl Gatherer {
         tally.exits += exits.len() as u64;
         let mut sums = vec![[0.0; 3]; exits.len()];
         let mut tuning = self.tuning;
+        if detail == Detail::Coarse {
+            tuning.error = tuning.error.max(COARSE);
+        }
         let each = exits.iter().zip(keys);
         match &self.estimate {
             Estimate::Notes(cache) => out.extend(each.map(|(exit, &key)| notes(cache, model, exit, key, tally))),

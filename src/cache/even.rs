@@ -1,7 +1,7 @@
 //! Even light from all sides on a body, for its [`Balance`].
 
 use super::balance::Known;
-use super::{Balance, Cache, CachedSample, GatherPoint, Gatherer, Plan, Scratch, Tuning};
+use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, Scratch, Tuning};
 use crate::bssrdf::{Exit, ModelName, Partition};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec4};
@@ -63,7 +63,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             };
             let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
             let mut sums = Vec::new();
-            plan.sum(&gatherer, &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
+            plan.sum((&gatherer, Detail::Fine), &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
             let divisor = |sum: &Rgb| {
                 let divisor = |c: usize| {
                     let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]));

@@ -23,7 +23,7 @@ pub use columns::Columns;
 pub use cut::{Cut, Scratch, Tuning};
 pub use density::Density;
 pub use envelope::{Envelope, Fall};
-pub use estimate::{Gatherer, PLAIN_SUM};
+pub use estimate::{Detail, Gatherer, PLAIN_SUM};
 pub use even::balance;
 pub use fill::{Directions, Filler, Receiver, Shadow};
 pub use near::{GatherPoint, NearField, Step};

@@ -2,8 +2,8 @@
 //! way of a pass.
 
 use super::{
-    Balance, Cache, CachedSample, Columns, Density, Directions, Envelope, Filler, GatherPoint, Gatherer, NearField,
-    Receiver, Scratch, Seen, Survey, Tuning,
+    Balance, Cache, CachedSample, Columns, Density, Detail, Directions, Envelope, Filler, GatherPoint, Gatherer,
+    NearField, Receiver, Scratch, Seen, Survey, Tuning,
 };
 use crate::bssrdf::{Entry, Exit, Partition};
 use crate::error::Result;
@@ -218,7 +218,7 @@ impl Plan {
     /// The sum over the cache at each of `points`, into `sums`.
     pub fn sum(
         &self,
-        gatherer: &Gatherer,
+        (gatherer, detail): (&Gatherer, Detail),
         points: &[GatherPoint],
         scratch: &mut Scratch,
         tally: &mut Tally,
@@ -228,7 +228,7 @@ impl Plan {
         let keys: Vec<u64> = points.iter().map(|p| p.stream.key()).collect();
         let kernel = (&*self.body.model, &self.envelope);
         Clock::time(&mut tally.clock.gather, || {
-            gatherer.gather(kernel, &exits, &keys, scratch, &mut tally.gather, sums);
+            gatherer.gather(kernel, (&exits, detail), &keys, scratch, &mut tally.gather, sums);
             if let Some(Some(balance)) = self.balance.get() {
                 points.iter().zip(sums.iter_mut()).for_each(|(p, sum)| *sum = *sum * balance.at(p.place, p.exit.n));
             }
@@ -239,13 +239,13 @@ impl Plan {
     pub fn gather(
         &self,
         (view, lights): (View<'_>, &Lights),
-        gatherer: &Gatherer,
+        (gatherer, detail): (&Gatherer, Detail),
         points: &[GatherPoint],
         scratch: &mut Scratch,
         tally: &mut Tally,
         sums: &mut Vec<Rgb>,
     ) {
-        self.sum(gatherer, points, scratch, tally, sums);
+        self.sum((gatherer, detail), points, scratch, tally, sums);
         if let Some(near) = &self.near {
             let even = Density::even();
             near.add(&self.filler(view, lights, &self.streams[0], &even), points, tally, sums);

@@ -8,7 +8,7 @@
 use super::volume_path::{Draws, Modelled, VolumePath, VolumePathOptions};
 use super::{MOST_SURFACES, Part, View};
 use crate::bssrdf::Exit;
-use crate::cache::{Cache, CachedSample, GatherPoint, Plan, Scratch, SubsurfaceOptions};
+use crate::cache::{Cache, CachedSample, Detail, GatherPoint, Plan, Scratch, SubsurfaceOptions};
 use crate::geometry::SurfacePoint;
 use crate::light::Lights;
 use crate::math::{Rgb, Vec3, hash_combine, unit_f32};
@@ -86,7 +86,7 @@ impl Indirect {
         let own = hash_combine(seed, PURPOSE);
         let streams = |object| Turn::seeds(own).map(|seed| CacheStream::new(Points::Sobol, seed, object));
         Self {
-            once: modelled.iter().flatten().any(|m| m.walked == Some(1)),
+            once: modelled.iter().flatten().any(|m| m.once),
             paths: VolumePath::over_models(
                 scene,
                 modelled,
@@ -288,9 +288,16 @@ impl Round<'_> {
                 let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
                 if level == 1 {
                     let around = (self.view, self.lights);
-                    plan.gather(around, &gatherer, &points, &mut scratch, &mut found.tally, &mut sums);
+                    plan.gather(
+                        around,
+                        (&gatherer, Detail::Coarse),
+                        &points,
+                        &mut scratch,
+                        &mut found.tally,
+                        &mut sums,
+                    );
                 } else {
-                    plan.sum(&gatherer, &points, &mut scratch, &mut found.tally, &mut sums);
+                    plan.sum((&gatherer, Detail::Coarse), &points, &mut scratch, &mut found.tally, &mut sums);
                 }
                 for ((at, point), sum) in places.iter().zip(&points).zip(&sums) {
                     let w = point.exit.w;

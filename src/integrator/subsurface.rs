@@ -8,7 +8,7 @@ use super::single::Single;
 use super::volume_path::{Asked, Modelled, Scratch as PathScratch};
 use super::{CameraRay, Integrator, KnownLights, Part, camera_hits};
 use crate::bssrdf::Exit;
-use crate::cache::{Cache, GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, balance, seen};
+use crate::cache::{Cache, Detail, GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, balance, seen};
 use crate::error::Result;
 use crate::geometry::{Solid, SurfacePoint};
 use crate::light::{Lights, emitted};
@@ -104,7 +104,7 @@ impl Subsurface {
                 Some(GatherPoint { exit, place: at.x, stream: rays[i].stream })
             };
             let points: Vec<GatherPoint> = group.iter().filter_map(point).collect();
-            plan.gather((view, &self.light.lights), gatherer, &points, &mut scratch, tally, &mut sums);
+            plan.gather((view, &self.light.lights), (gatherer, Detail::Fine), &points, &mut scratch, tally, &mut sums);
             for ((&(_, i), point), &sum) in group.iter().zip(&points).zip(&sums) {
                 inside[i] = sum * transmittance(plan.body.eta, point.exit.n.dot(point.exit.w));
                 if let (Some(single), Some(hit)) = (&self.single, &hits[i]) {
@@ -133,9 +133,9 @@ impl Subsurface {
             };
             asked.extend(paths.asked.drain(..).map(|asked| (i, asked)));
         }
-        asked.sort_by_key(|(_, asked)| asked.object);
+        asked.sort_by_key(|(_, asked)| (asked.object, asked.later));
         let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
-        for group in asked.chunk_by(|a, b| a.1.object == b.1.object) {
+        for group in asked.chunk_by(|a, b| (a.1.object, a.1.later) == (b.1.object, b.1.later)) {
             let object = group[0].1.object as usize;
             let (Some(plan), Some(gatherer)) = (&self.plans[object], &pass[object]) else { continue };
             let point = |(_, asked): &(usize, Asked)| {
@@ -144,7 +144,8 @@ impl Subsurface {
                 GatherPoint { exit, place: asked.at.x, stream: asked.stream }
             };
             let points: Vec<GatherPoint> = group.iter().map(point).collect();
-            plan.gather((view, &self.light.lights), gatherer, &points, &mut scratch, tally, &mut sums);
+            let detail = if group[0].1.later { Detail::Coarse } else { Detail::Fine };
+            plan.gather((view, &self.light.lights), (gatherer, detail), &points, &mut scratch, tally, &mut sums);
             for ((i, asked), sum) in group.iter().zip(&sums) {
                 out[*i] += *sum * asked.weight;
             }
@@ -192,11 +193,10 @@ impl Subsurface {
 fn modelled(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
     let of = |plan: &Option<Arc<Plan>>| {
         let plan = plan.as_ref()?;
-        let first = options.single && !plan.body.model.claims().first_order;
+        let once = options.single && !plan.body.model.claims().first_order;
         let clear = lets_light_through(scene, plan.body.object, plan.medium());
-        let walked = if first { Some(1) } else { clear.then_some(0) };
         let near = plan.near.as_ref().map(|_| plan.clone());
-        Some(Modelled { eta: plan.body.eta, walked, near })
+        Some(Modelled { eta: plan.body.eta, clear, once, near })
     };
     plans.iter().map(of).collect()
 }
@@ -227,7 +227,7 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
     match (all.next(), all.next()) {
         (None, _) => false,
         (Some((i, object)), None) => {
-            let clear = modelled[i].as_ref().is_some_and(|m| m.walked == Some(0));
+            let clear = modelled[i].as_ref().is_some_and(|m| m.clear);
             let size = object.mesh.bounds().map_or(0.0, |bounds| bounds.extent().max_element());
             clear || !Solid::new(&object.mesh).is_convex(ROUNDING * size)
         }

@@ -108,6 +108,8 @@ pub struct Asked {
     pub weight: Rgb,
     /// Numbers of its own.
     pub stream: PixelStream,
+    /// Whether the camera sees it over other surfaces.
+    pub later: bool,
 }
 
 impl VolumePath {

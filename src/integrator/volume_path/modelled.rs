@@ -1,6 +1,6 @@
 //! Paths over bodies whose light a model has: there it is asked for, and only what the model lacks is walked.
 
-use super::body::{Body, Edge, Watch, survives};
+use super::body::{Body, Edge, MOST_SURFACES, Watch, survives};
 use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
 use super::draws::Draws;
@@ -16,7 +16,7 @@ use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{PixelStream, cosine_hemisphere};
 use crate::scene::{Orders, Scene};
-use crate::surface::Lambertian;
+use crate::surface::{Boundary, Bsdf, Lambertian};
 use crate::tally::Tally;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -26,8 +26,10 @@ use std::sync::Arc;
 pub struct Modelled {
     /// n_inside / n_outside.
     pub eta: f32,
-    /// Paths that were scattered so often inside, or less, are no part of the model and go on; `None` where none do.
-    pub walked: Option<u32>,
+    /// Whether light comes through unscattered, which is no part of any model.
+    pub clear: bool,
+    /// Whether light scattered once is no part of the model.
+    pub once: bool,
     /// Where light that comes over other surfaces and enters close to an exit is no part of the cache: paths step there.
     pub near: Option<Arc<Plan>>,
 }
@@ -43,6 +45,10 @@ impl Watch for AtMost {
     }
 }
 
+/// A mirror image of at least this weight is followed beside the rest.
+const BRANCHING: f32 = 1e-3;
+/// Light that comes through a body with less than this share goes on by chance.
+const FAINT: f32 = 0.1;
 /// A path of at least this weight asks every model on its way.
 const ASKING: f32 = 0.25;
 /// Purpose of the numbers of a path's later questions.
@@ -60,7 +66,7 @@ impl VolumePath {
     ) -> Self {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, ..options };
         let surfaces = Self::surfaces(scene, options);
-        let bodies = endless_bodies(scene, |i| modelled[i].as_ref().is_some_and(|m| m.walked.is_some()));
+        let bodies = endless_bodies(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
         Self { throughs, bodies, modelled, bounces, ..surfaces }
     }
@@ -121,7 +127,7 @@ impl VolumePath {
         tally: &mut Tally,
     ) -> Option<(Ray, Rgb)> {
         let body = self.body(object)?;
-        let most = self.modelled[object as usize].as_ref()?.walked?;
+        let most = u32::from(self.modelled[object as usize].as_ref()?.once);
         let mut spectrum = Spectrum::new(flux, draws.number());
         let exit = body.walk(view, from, &mut spectrum, draws, &mut AtMost(most), &mut tally.walk)?;
         Some((Ray::new(exit.at.leave(exit.w), exit.w), spectrum.value_outside()))
@@ -141,7 +147,7 @@ impl CameraPath<'_> {
         let n = at.normal_seen_from(-direction);
         let passed = transmittance(model.eta, -n.dot(direction));
         let (object, w, stream) = (hit.mesh, -direction, self.stream);
-        self.scratch.asked.push(Asked { object, at, w, weight: Rgb::splat(passed), stream });
+        self.scratch.asked.push(Asked { object, at, w, weight: Rgb::splat(passed), stream, later: false });
         let (spectrum, draws) = (self.spectrum, self.draws.clone());
         if self.method.options.specular {
             self.spectrum.scale(Rgb::splat(reflectance(model.eta, -n.dot(direction))));
@@ -157,48 +163,99 @@ impl CameraPath<'_> {
             }
             self.stepped = false;
         }
-        (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws, None);
-        if let (Some(body), true) = (self.method.body(hit.mesh), model.walked.is_some()) {
+        let Some(body) = self.method.body(hit.mesh) else { return };
+        if model.clear {
+            (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws.fork(3), None);
+            self.spectrum.scale(Rgb::splat(passed));
+            if let Some(ray) = refract(w, n, body.eta).and_then(|inside| self.straight(body, &at, inside)) {
+                self.trace(ray);
+            }
+        }
+        if model.once {
+            (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws, None);
             self.order = 0;
-            if let Some(ray) = enter(self, Entry::alone(body), hit, direction) {
+            if let Some(ray) = enter(self, Entry::alone(body), hit, direction).filter(|_| self.order > 0) {
                 self.trace(ray);
             }
         }
     }
 
-    /// A body on the way: mirrored by the chance of it, else its model is asked, and what that lacks goes on.
+    /// A body on the way: its model is asked, and what that lacks goes on, by chance one of its kinds. What the boundary mirrors is
+    /// followed by itself while the path has weight, else by the chance of it.
     pub fn meet_modelled(&mut self, hit: &Hit, at: &SurfacePoint, direction: Vec3) -> Option<Ray> {
         let model = self.method.modelled[hit.mesh as usize].as_ref()?;
         self.by_bsdf = None;
         let (n, w) = (at.n_geometric, -direction);
-        if self.draws.number() < reflectance(model.eta, n.dot(w)) {
-            let next = reflect(w, n);
-            return Some(Ray::new(at.leave(next), next));
+        let mirrored = reflectance(model.eta, n.dot(w));
+        let away = reflect(w, n);
+        let weight = self.spectrum.value_outside().max();
+        if weight * mirrored >= BRANCHING {
+            let (spectrum, draws) = (self.spectrum, self.draws.clone());
+            self.spectrum.scale(Rgb::splat(mirrored));
+            self.draws = draws.fork(1);
+            self.trace(Ray::new(at.leave(away), away));
+            (self.spectrum, self.draws, self.by_bsdf, self.left) = (spectrum, draws.fork(2), None, None);
+            self.stepped = false;
+            self.spectrum.scale(Rgb::splat(1.0 - mirrored));
+        } else if self.draws.number() < mirrored {
+            return Some(Ray::new(at.leave(away), away));
         }
+        self.ask(hit, at, w);
+        let outside = self.view.outwards(hit).n_geometric.dot(w) > 0.0;
+        let body = self.method.body(hit.mesh).filter(|_| outside);
+        let step = model.near.as_ref();
+        let there = [step.is_some(), body.is_some() && model.clear, body.is_some() && model.once];
+        let count = there.into_iter().filter(|there| *there).count() as f32;
+        let picked = (self.draws.number() * count) as usize;
+        let (kind, _) = there.into_iter().enumerate().filter(|(_, there)| *there).nth(picked)?;
+        self.spectrum.scale(Rgb::splat(count));
+        match (kind, body, refract(w, n, model.eta)) {
+            (0, ..) => self.step(step?, at, w),
+            (1, Some(body), Some(inside)) => self.straight(body, at, inside),
+            (_, Some(body), Some(inside)) => {
+                self.order = 0;
+                self.inside(Entry::alone(body), at, inside).filter(|_| self.order > 0)
+            }
+            _ => None,
+        }
+    }
+
+    /// Asks the model of the body at `hit`. A sum over a cache costs as much as many rays: of paths of little weight some ask, with more.
+    fn ask(&mut self, hit: &Hit, at: &SurfacePoint, w: Vec3) {
         let stream = self.stream.aside(hash_combine(LATER, self.asked.into()));
         self.asked += 1;
         let weight = self.spectrum.value_outside();
-        // A sum over a cache costs as much as many rays: of paths of little weight some ask, with more.
         let chance = (weight.max() / ASKING).min(1.0);
         if self.draws.number() < chance {
-            self.scratch.asked.push(Asked { object: hit.mesh, at: *at, w, weight: weight * (1.0 / chance), stream });
+            let weight = weight * (1.0 / chance);
+            self.scratch.asked.push(Asked { object: hit.mesh, at: *at, w, weight, stream, later: true });
         }
-        let outside = self.view.outwards(hit).n_geometric.dot(w) > 0.0;
-        let body = self.method.body(hit.mesh).filter(|_| model.walked.is_some() && outside);
-        let step = match (&model.near, body) {
-            (Some(plan), None) => Some(plan),
-            // One of both, at even chances.
-            (Some(plan), Some(_)) => {
-                self.spectrum.scale(Rgb::splat(2.0));
-                (self.draws.number() < 0.5).then_some(plan)
+    }
+
+    /// Through a body from `at` along `w` without being scattered; the ray on which the path leaves.
+    fn straight(&mut self, body: &Body, at: &SurfacePoint, mut w: Vec3) -> Option<Ray> {
+        let mut from = at.leave(w);
+        for _ in 0..MOST_SURFACES {
+            self.tally.rays.bounce += 1;
+            let hit = self.view.rays.closest(&Ray::new(from, w)).filter(|hit| hit.mesh == body.object)?;
+            let at = self.view.outwards(&hit);
+            if at.n_geometric.dot(w) <= 0.0 {
+                return None;
             }
-            (None, _) => None,
-        };
-        if let Some(plan) = step {
-            return self.step(plan, at, w);
+            let before = self.spectrum.value_outside().max();
+            self.spectrum.scale(body.medium.sigma_t.map(|s| (-s * hit.t).exp()));
+            let left = self.spectrum.value_outside().max();
+            if left <= 0.0 || !survives(left / before / FAINT, &mut self.spectrum, &mut self.draws) {
+                return None;
+            }
+            let next = Boundary { eta: body.eta }.sample(&at, -w, [self.draws.number(), 0.0, 0.0])?.wi;
+            from = at.leave(next);
+            if next.dot(at.n_geometric) > 0.0 {
+                return Some(Ray::new(from, next));
+            }
+            w = next;
         }
-        self.order = 0;
-        self.inside(Entry::alone(body?), at, refract(w, n, model.eta)?)
+        None
     }
 
     /// From where light leaves along `w` to a place near it where it entered, and out by the cosine: light of lights that the path
@@ -228,7 +285,6 @@ impl CameraPath<'_> {
 
     /// Whether light that was scattered as often as the path's is part of the model of `body`.
     pub fn in_model(&self, body: &Body) -> bool {
-        let walked = self.method.modelled[body.object as usize].as_ref().map(|m| m.walked);
-        walked.is_some_and(|most| most.is_none_or(|most| self.order > most))
+        self.method.modelled[body.object as usize].is_some() && self.order > 1
     }
 }
