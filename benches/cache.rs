@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
-use marmor::cache::{Cache, Density, Directions, Envelope, Filler, Gatherer, Receiver, Scratch, Tuning};
+use marmor::cache::{Cache, Density, Detail, Directions, Envelope, Filler, Gatherer, Receiver, Scratch, Tuning};
 use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
 use marmor::math::{DVec3, Rgb, hash};
@@ -161,7 +161,14 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
         let mut sum = |tile: &Vec<Exit>| {
             let mut out = Vec::new();
             let exits = few(tile);
-            all.gather((model, &envelope), &exits, &vec![0; exits.len()], &mut scratch, &mut tally, &mut out);
+            all.gather(
+                (model, &envelope),
+                (&exits, Detail::Fine),
+                &vec![0; exits.len()],
+                &mut scratch,
+                &mut tally,
+                &mut out,
+            );
             out
         };
         tiles.iter().map(&mut sum).collect()
@@ -180,7 +187,14 @@ fn compare(bench: &Bench<'_>, medium: (&str, Medium), name: ModelName, count: u3
                     let key = |i: usize| hash(1 + ((round * DRAWS + draw) * 1000 + t as u64) * 10_000 + i as u64);
                     let keys: Vec<u64> = (0..exits.len()).map(key).collect();
                     let start = Instant::now();
-                    e.gatherer.gather((model, &envelope), &exits, &keys, &mut scratch, &mut e.tally, &mut out);
+                    e.gatherer.gather(
+                        (model, &envelope),
+                        (&exits, Detail::Fine),
+                        &keys,
+                        &mut scratch,
+                        &mut e.tally,
+                        &mut out,
+                    );
                     seconds += start.elapsed().as_secs_f64();
                     let step = exits.len() / FEW;
                     for (value, exact) in out.iter().step_by(step).zip(exact) {
@@ -273,7 +287,14 @@ fn timed(bench: &Bench<'_>) {
         group.bench_function(format!("{}, pairs", estimator.name()), |b| {
             b.iter(|| {
                 key += 1;
-                gatherer.gather((model, &envelope), &[exit], &[hash(key)], &mut scratch, &mut tally, &mut out);
+                gatherer.gather(
+                    (model, &envelope),
+                    (&[exit], Detail::Fine),
+                    &[hash(key)],
+                    &mut scratch,
+                    &mut tally,
+                    &mut out,
+                );
                 black_box(out[0])
             });
         });

@@ -46,6 +46,7 @@ fn method(scene: &Scene, estimator: Estimator, samples: u32) -> Subsurface {
         cut_error: Some(0.2),
         specular: false,
         single: false,
+        bounces: 0,
         seed: 3,
         ..Default::default()
     };

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used)] // a test that cannot make its model has failed
 
 use marmor::bssrdf::{Bssrdf, Entry, Exit, ModelName, ModelOptions};
-use marmor::cache::{Cache, CachedSample, Envelope, Gatherer, Scratch, Tuning};
+use marmor::cache::{Cache, CachedSample, Detail, Envelope, Gatherer, Scratch, Tuning};
 use marmor::math::{Rgb, Vec3, hash, unit_f32};
 use marmor::optics::Medium;
 use marmor::scene::Estimator;
@@ -69,7 +69,7 @@ fn gather(
     tally: &mut GatherTally,
 ) -> Rgb {
     let mut out = Vec::new();
-    gatherer.gather((model, envelope), &[*exit], &[key], scratch, tally, &mut out);
+    gatherer.gather((model, envelope), (&[*exit], Detail::Fine), &[key], scratch, tally, &mut out);
     out[0]
 }
 
@@ -205,7 +205,7 @@ fn a_group_of_exits_has_the_means_of_its_sums() {
         let exact: Vec<[f64; 3]> = exits.iter().map(|exit| exact_sum(&*model, &cache, exit)).collect();
         for run in 0..runs {
             let keys: Vec<u64> = (0..exits.len() as u64).map(|i| hash(1 + run * 1000 + i)).collect();
-            gatherer.gather((&*model, &envelope), &exits, &keys, &mut scratch, &mut tally, &mut out);
+            gatherer.gather((&*model, &envelope), (&exits, Detail::Fine), &keys, &mut scratch, &mut tally, &mut out);
             for ((sum, value), exact) in sums.iter_mut().zip(&out).zip(&exact) {
                 for c in 0..3 {
                     let apart = f64::from(value[c]) - exact[c];

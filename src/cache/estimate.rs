@@ -19,7 +19,7 @@ pub enum Detail {
 }
 
 /// The largest share of a coarse sum that one node may be wrong by, at least.
-const COARSE: f32 = 0.3;
+const COARSE: f32 = 2.0;
 
 /// A cache made ready for one estimator.
 pub struct Gatherer {

@@ -323,7 +323,9 @@ mod tests {
             for (k, from) in (0..).zip(references(centre, apart)) {
                 let mut chances: Vec<f64> = (0..n as usize).map(|i| tree.chance(&from, i)).collect();
                 let sum: f64 = chances.iter().sum();
-                assert!(sum < 1.0 + 1e-9 && (sum > 0.5 || n < 10), "{n} lights, {from:?}: {sum}");
+                // From far away all may be below the horizon.
+                let below = from.n.is_some_and(|n| n.as_dvec3().dot((centre - from.x).normalize_or_zero()) < 0.05);
+                assert!(sum < 1.0 + 1e-9 && (sum > 0.5 || n < 10 || below), "{n} lights, {from:?}: {sum}");
                 chances.push(1.0 - sum);
                 let draws = 20_000;
                 let (mut counts, mut left) = (vec![0.0; n as usize + 1], 0.0);
