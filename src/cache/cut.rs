@@ -12,6 +12,8 @@ const GUESS: f32 = 0.3;
 const GROUP: usize = 32;
 /// A group whose cut is longer than this is halved: its exits are too far apart to have one cut.
 const LONG: usize = 4096;
+/// The same for sums coarser than a scene can ask for: their exits are few and far between.
+const LONG_IF_COARSE: usize = 256;
 /// A channel below this share of the brightest is held to the accuracy of one of this size.
 const DARK_CHANNEL: f32 = 0.02;
 /// Exits at which the sum of a group is guessed, at most.
@@ -132,7 +134,8 @@ impl Sums<'_> {
             let centre = bounds.centre();
             let radius = order.iter().map(|i| at(i).distance(centre)).fold(0.0, f32::max);
             self.collect(order, &Ball { centre, radius });
-            if order.len() == 1 || self.scratch.picked.len() + self.scratch.far.len() <= LONG {
+            let long = if self.tuning.error > 1.0 { LONG_IF_COARSE } else { LONG };
+            if order.len() == 1 || self.scratch.picked.len() + self.scratch.far.len() <= long {
                 self.sum(self.keys[first as usize], order);
                 return;
             }
