@@ -10,10 +10,10 @@ const GUESS: f32 = 0.3;
 
 /// Exits of one group at most.
 const GROUP: usize = 32;
+/// The same for coarse sums.
+const GROUP_IF_COARSE: usize = 4;
 /// A group whose cut is longer than this is halved: its exits are too far apart to have one cut.
 const LONG: usize = 4096;
-/// The same for sums coarser than a scene can ask for: their exits are few and far between.
-const LONG_IF_COARSE: usize = 256;
 /// A channel below this share of the brightest is held to the accuracy of one of this size.
 const DARK_CHANNEL: f32 = 0.02;
 /// Exits at which the sum of a group is guessed, at most.
@@ -130,12 +130,13 @@ impl Sums<'_> {
         let exits = self.exits;
         let at = |i: &u32| exits[*i as usize].x;
         let bounds = Aabb32::around(order.iter().map(at));
-        if order.len() <= GROUP {
+        // Sums coarser than a scene can ask for have few exits, far between.
+        let group = if self.tuning.error > 1.0 { GROUP_IF_COARSE } else { GROUP };
+        if order.len() <= group {
             let centre = bounds.centre();
             let radius = order.iter().map(|i| at(i).distance(centre)).fold(0.0, f32::max);
             self.collect(order, &Ball { centre, radius });
-            let long = if self.tuning.error > 1.0 { LONG_IF_COARSE } else { LONG };
-            if order.len() == 1 || self.scratch.picked.len() + self.scratch.far.len() <= long {
+            if order.len() == 1 || self.scratch.picked.len() + self.scratch.far.len() <= LONG {
                 self.sum(self.keys[first as usize], order);
                 return;
             }
@@ -151,7 +152,8 @@ impl Sums<'_> {
     /// The cut of a group: samples near it and nodes far from it.
     fn collect(&mut self, order: &[u32], ball: &Ball) {
         // The darkest of some exits decides how fine the cut is.
-        let step = order.len().div_ceil(GUESSES);
+        let guesses = if self.tuning.error > 1.0 { 1 } else { GUESSES };
+        let step = order.len().div_ceil(guesses);
         let mut least = Vec4::splat(f32::INFINITY);
         for &i in order.iter().step_by(step) {
             least = least.min(self.guess(self.exits[i as usize].x));

@@ -129,6 +129,11 @@ impl Subsurface {
         for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
             out[i] = match hit {
                 None => self.light.lights.environment(ray.ray.direction),
+                Some(hit) if view.scene.surface(hit.mesh).is_opaque() => {
+                    let (at, albedo) = (view.point(hit, ray.ray.direction), self.albedo[hit.mesh as usize]);
+                    let straight = self.light.reflected(view, &at, albedo, &mut ray.stream.clone(), tally);
+                    straight + indirect.paths.reflected(view, ray, hit, &mut paths, tally)
+                }
                 Some(hit) => indirect.paths.seen(view, ray, hit, &mut paths, tally),
             };
             asked.extend(paths.asked.drain(..).map(|asked| (i, asked)));

@@ -42,7 +42,8 @@ pub struct CameraPath<'a> {
     pub order: u32,
     /// Density [1/sr] of the present direction, where lights were asked for at the last surface, and that place.
     pub by_bsdf: Option<(f32, Reference)>,
-    /// Whether it comes from a step in a near field, which has the light of lights that it meets next.
+    /// Whether the light of lights that it meets next is in a sum already: after a step in a near field, or a surface whose direct light
+    /// was asked for apart.
     pub stepped: bool,
     /// The body that was just left, and how.
     pub left: Option<(&'a Body, Option<Straight>)>,

@@ -94,6 +94,30 @@ impl VolumePath {
         self.shade(view, &[], ray, scratch, tally, hit)
     }
 
+    /// Radiance that the opaque surface at `hit` reflects towards the camera, but for light straight from lights, and for what is asked of
+    /// models, which is added to `scratch`.
+    pub(in super::super) fn reflected(
+        &self,
+        view: View<'_>,
+        ray: &CameraRay,
+        hit: &Hit,
+        scratch: &mut Scratch,
+        tally: &mut Tally,
+    ) -> Rgb {
+        let direction = ray.ray.direction;
+        let mut path = self.path(view, &[], ray.stream, scratch, tally);
+        let at = view.point(hit, direction);
+        let [u, v] = path.draws.pair();
+        let next = view.scene.surface(hit.mesh).bsdf.sample(&at, -direction, [u, v, 0.0]);
+        // No roulette yet: a path of little weight is a grain in the picture of a dark surface.
+        if let Some(next) = next.filter(|next| !next.weight.is_black() && at.n_geometric.dot(next.wi) > 0.0) {
+            path.spectrum.scale(next.weight);
+            path.stepped = true;
+            path.trace(Ray::new(at.leave(next.wi), next.wi));
+        }
+        path.radiance
+    }
+
     /// Radiance that a path finds which comes along `direction` to the opaque surface at `hit`, but for what shines there.
     pub(in super::super) fn arriving(
         &self,
