@@ -142,6 +142,24 @@ fn what_nothing_reflects_to_is_left_out() {
     }
 }
 
+/// Between two faces that mirror nearly all, and in a body that is inside out, paths are long and their branches few.
+#[test]
+fn long_paths_between_mirrors_end() {
+    let box_of = |name: &str, low: f64, high: f64| {
+        let centre = [0.0, 0.5 * (low + high), 0.0];
+        sphere(name, centre, 0.5 * (high - low), 12, "milk").replace("material", "flip = true\nmaterial")
+            + &rectangle(&format!("{name} below"), [0.0, low, 0.0], [40.0, 0.0, 0.0], [0.0, 0.0, -40.0], "milk")
+            + &rectangle(&format!("{name} above"), [0.0, high, 0.0], [40.0, 0.0, 0.0], [0.0, 0.0, 40.0], "milk")
+    };
+    let text = camera([0.0, 0.01, 30.0], [0.0, 0.0, -10.0], 20.0, [24, 16])
+        + &box_of("gap", -0.05, 0.07)
+        + &translucent("milk", "sigma_s = [20, 20, 20]\nsigma_a = [0.1, 0.1, 0.1]\ng = 0\neta = 1.5")
+        + &sky(1.0);
+    let scene = load(&text);
+    let image = film(&subsurface(&scene, options(Estimator::Cut, 1024, 1)), &scene, 4, 1, &mut []).image();
+    assert!(image.pixels.iter().all(|p| p.is_finite()) && channels(&image)[0] > 0.0);
+}
+
 /// No thread's work, and no pass's, depends on another's.
 #[test]
 fn the_bytes_are_the_same_for_any_number_of_threads() {

@@ -213,7 +213,8 @@ impl CameraPath<'_> {
         let mirrored = reflectance(model.eta, n.dot(w));
         let away = reflect(w, n);
         let weight = self.spectrum.value_outside().max();
-        if weight * mirrored >= BRANCHING {
+        // What is mirrored has at most half of the weight: branches end.
+        if weight * mirrored >= BRANCHING && mirrored <= 0.5 {
             let (spectrum, draws) = (self.spectrum, self.draws.clone());
             self.spectrum.scale(Rgb::splat(mirrored));
             self.draws = draws.fork(1);
