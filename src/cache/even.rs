@@ -12,10 +12,10 @@ use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
-/// Samples of even light.
-const SAMPLES: u32 = 1 << 16;
-/// Points where what it brings is gathered.
-const POINTS: u32 = 1 << 14;
+/// Samples of even light, for one of a pass, within bounds.
+const SAMPLES: [u32; 2] = [1 << 11, 1 << 16];
+/// Of them, for each point where what they bring is gathered.
+const SAMPLES_PER_POINT: u32 = 4;
 /// The largest share of the sum that one node of a cut may be wrong by: means over neighbours even it out.
 const ERROR: f32 = 0.2;
 /// Points gathered together.
@@ -25,6 +25,8 @@ const CHUNK: usize = 1024;
 /// farther than to the next sample of a cache.
 pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let body = &plan.body;
+    let samples = plan.samples.clamp(SAMPLES[0], SAMPLES[1]);
+    let count = samples / SAMPLES_PER_POINT;
     let surface = view.scene.surface(body.object).inside.as_ref()?;
     if body.model.name() == ModelName::SLAB || plan.near.is_some() {
         return None;
@@ -46,11 +48,11 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
         let w = cosine_hemisphere(at.n, [numbers.1[2], numbers.1[3]]);
         body.enters(&at, w, (Rgb::WHITE, body.table.area() as f32), numbers.1[4])
     };
-    let lit: Vec<CachedSample> = (0..u64::from(SAMPLES)).into_par_iter().filter_map(enter).collect();
-    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(SAMPLES) / body.table.area();
+    let lit: Vec<CachedSample> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
+    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / body.table.area();
     let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition: Partition::NONE };
-    let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: SAMPLES }, &*body.model, tuning);
-    let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(POINTS)).map(|i| points.numbers(i)).collect();
+    let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: samples }, &*body.model, tuning);
+    let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(count)).map(|i| points.numbers(i)).collect();
     picks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
     let known: Vec<Vec<Known>> = picks
         .par_chunks(CHUNK)

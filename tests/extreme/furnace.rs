@@ -50,7 +50,12 @@ pub fn seen<I: marmor::integrator::Integrator>(
 pub fn options(estimator: Estimator, single: bool) -> SubsurfaceOptions {
     // Above what is summed without a tree.
     let cache_samples = if estimator == Estimator::Notes { 1500 } else { 4000 };
-    SubsurfaceOptions { single, spread: Spread::Area, ..super::harness::subsurface(estimator, cache_samples) }
+    SubsurfaceOptions {
+        single,
+        spread: Spread::Area,
+        bounces: 0,
+        ..super::harness::subsurface(estimator, cache_samples)
+    }
 }
 
 pub fn by(scene: &Scene, backend: Backend, estimator: Estimator, single: bool) -> Mean {
