@@ -87,12 +87,12 @@ fn white_bodies_over_a_white_floor_are_white() {
 #[test]
 fn a_near_field_has_the_light_that_the_cache_has() {
     let lamp = rectangle("lamp", [0.0, 5.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "glow") + &emissive("glow", 10.0);
-    let scene = load(&bodies(60.0, 0.5, &(diffuse("floor", [0.8, 0.6, 0.4]) + &lamp)));
+    let scene = load(&bodies(30.0, 0.5, &(diffuse("floor", [0.8, 0.6, 0.4]) + &lamp)));
     let of = |samples| move |estimator| move |seed| options(estimator, samples, seed);
     let near = Subsurface::new(&scene, of(2048)(Estimator::Cut)(1)).unwrap();
     assert_eq!(near.near_fields(), 2, "the near field is what this is about");
     let near = means(&scene, 24, 10, |seed| subsurface(&scene, of(2048)(Estimator::Cut)(seed)));
-    let cache = means(&scene, 24, 10, |seed| subsurface(&scene, of(16384)(Estimator::Thinned)(seed)));
+    let cache = means(&scene, 40, 10, |seed| subsurface(&scene, of(16384)(Estimator::Thinned)(seed)));
     for c in 0..3 {
         agree(near[c], cache[c], WITHIN, "near field against cache");
     }

@@ -31,6 +31,8 @@ pub struct CameraPath<'a> {
     pub stream: PixelStream,
     /// Questions to models so far, but for the first surface's.
     pub asked: u32,
+    /// Mirror images that it is in, of those followed beside the rest.
+    pub branches: u32,
     /// Numbers for connections, so that they do not disturb the walk's.
     pub coins: Draws,
     pub spectrum: Spectrum,

@@ -248,6 +248,7 @@ impl VolumePath {
             draws,
             stream,
             asked: 0,
+            branches: 0,
             direct: 1.0,
             other: 1.0,
             order: 0,

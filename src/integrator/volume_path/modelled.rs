@@ -47,6 +47,8 @@ impl Watch for AtMost {
 
 /// A mirror image of at least this weight is followed beside the rest.
 const BRANCHING: f32 = 1e-3;
+/// Mirror images of mirror images that are followed so; those in them by chance.
+const MOST_BRANCHES: u32 = 4;
 /// Light that comes through a body with less than this share goes on by chance.
 const FAINT: f32 = 0.1;
 /// A path of at least this weight asks every model on its way.
@@ -210,24 +212,29 @@ impl CameraPath<'_> {
         let model = self.method.modelled[hit.mesh as usize].as_ref()?;
         self.by_bsdf = None;
         let (n, w) = (at.n_geometric, -direction);
+        // No light enters by the back of a face, and paths end there.
+        if self.view.outwards(hit).n_geometric.dot(w) <= 0.0 {
+            self.ask(hit, at, w);
+            return None;
+        }
         let mirrored = reflectance(model.eta, n.dot(w));
         let away = reflect(w, n);
         let weight = self.spectrum.value_outside().max();
-        // What is mirrored has at most half of the weight: branches end.
-        if weight * mirrored >= BRANCHING && mirrored <= 0.5 {
+        if weight * mirrored >= BRANCHING && self.branches < MOST_BRANCHES {
             let (spectrum, draws) = (self.spectrum, self.draws.clone());
+            self.branches += 1;
             self.spectrum.scale(Rgb::splat(mirrored));
             self.draws = draws.fork(1);
             self.trace(Ray::new(at.leave(away), away));
             (self.spectrum, self.draws, self.by_bsdf, self.left) = (spectrum, draws.fork(2), None, None);
             self.stepped = false;
+            self.branches -= 1;
             self.spectrum.scale(Rgb::splat(1.0 - mirrored));
         } else if self.draws.number() < mirrored {
             return Some(Ray::new(at.leave(away), away));
         }
         self.ask(hit, at, w);
-        let outside = self.view.outwards(hit).n_geometric.dot(w) > 0.0;
-        let body = self.method.body(hit.mesh).filter(|_| outside);
+        let body = self.method.body(hit.mesh);
         let step = model.near.as_ref();
         let there = [step.is_some(), body.is_some() && model.clear, body.is_some() && model.once];
         let count = there.into_iter().filter(|there| *there).count() as f32;
