@@ -2,7 +2,7 @@
 
 use super::balance::Known;
 use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, Scratch, Tuning};
-use crate::bssrdf::{Exit, ModelName, Partition};
+use crate::bssrdf::{Exit, ModelName, ModelOptions, Partition};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec4};
 use crate::optics::FresnelMoments;
@@ -33,8 +33,11 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     }
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
-    let total = body.model.total();
-    let on_a_plane = total.map(|total| (f64::from(total) / (PI * exit)) as f32);
+    let own = body.model.total();
+    // What begins with light scattered twice competes with light scattered once too: the standard dipole has about the total of both.
+    let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
+    let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
+    let on_a_plane = own.map(|total| (f64::from(total) / (PI * exit)) as f32);
     let mesh = &view.scene.objects[body.object as usize].mesh;
     let flat = |(pick, u): (f64, [f32; 7])| {
         let at = body.table.sample(pick, [u[0], u[1]]);
