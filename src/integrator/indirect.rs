@@ -153,7 +153,8 @@ impl Indirect {
                 break;
             }
             keep(caches, &rows, tally);
-            let source = |(rows, cache): (Vec<CachedSample>, &Option<Cache>)| {
+            let source = |(mut rows, cache): (Vec<CachedSample>, &Option<Cache>)| {
+                rows.retain(CachedSample::is_finite);
                 cache.as_ref().filter(|_| !rows.is_empty()).map(|_| Cache { lit: rows, attempted: 1 })
             };
             sources = rows.into_iter().zip(caches.iter()).map(source).collect();
@@ -173,8 +174,11 @@ fn keep(caches: &mut [Option<Cache>], rows: &Rows, tally: &mut Tally) {
     for (cache, rows) in caches.iter_mut().zip(rows) {
         let Some(cache) = cache else { continue };
         let times = cache.attempted as f32;
-        cache.lit.extend(rows.iter().map(|row| CachedSample { flux: row.flux * times, ..*row }));
+        let whole = rows.iter().map(|row| CachedSample { flux: row.flux * times, ..*row });
+        let before = cache.lit.len();
+        cache.lit.extend(whole.filter(CachedSample::is_finite));
         tally.gather.indirect += rows.len() as u64;
+        tally.gather.non_finite += (before + rows.len() - cache.lit.len()) as u64;
     }
 }
 
@@ -313,7 +317,11 @@ impl Round<'_> {
     /// Follows light along `ray` until nothing is left of it.
     fn follow(&self, mut ray: Ray, mut flux: Rgb, mut draws: Draws, found: &mut Found) {
         for _ in 0..self.of.bounces {
-            if !flux.is_finite() || flux.is_black() {
+            if !flux.is_finite() {
+                found.tally.gather.non_finite += 1;
+                return;
+            }
+            if flux.is_black() {
                 return;
             }
             found.tally.rays.bounce += 1;
@@ -364,7 +372,7 @@ impl Round<'_> {
     fn goes_on(&self, arrived: &Arrived<'_>, depth: f32, draws: &mut Draws, found: &mut Found) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
         let sample = plan.body.enters(&at, w, (flux, 1.0), depth);
-        found.rows.extend(sample.filter(CachedSample::is_finite).map(|sample| (plan.body.object, sample)));
+        found.rows.extend(sample.map(|sample| (plan.body.object, sample)));
         if draws.number() < reflectance(plan.body.eta, w.dot(at.n)) {
             let away = reflect(w, at.n);
             return Some((Ray::new(at.leave(away), away), flux));
