@@ -20,7 +20,7 @@ fn means<I: Integrator>(scene: &Scene, passes: u32, runs: u64, of: impl Fn(u64) 
 const WITHIN: Within = Within { errors: 6.0, noise: 0.01 };
 
 /// In a sphere that reflects evenly, light that was reflected once lights every place alike: with flux Φ of a small lamp,
-/// albedo ρ and area A the irradiance by reflected light is ρ Φ / A / (1 - ρ) [Walsh 1926], here less what meets the lamp again.
+/// albedo ρ and area A the irradiance by reflected light is ρ Φ / A / (1 - ρ), that of an integrating sphere, here less what meets the lamp again.
 #[test]
 fn a_sphere_is_lit_evenly_by_what_it_reflects() {
     let (side, albedo) = (0.05, [0.2, 0.5, 0.9]);
