@@ -71,7 +71,8 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             plan.sum((&gatherer, Detail::Fine), &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
             let divisor = |sum: &Rgb| {
                 let divisor = |c: usize| {
-                    let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]));
+                    // Some models send out more than has entered.
+                    let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]).min(1.0));
                     (s * p + 1.0 - p) as f32
                 };
                 // A channel that no light comes out of is as good as any.
