@@ -108,7 +108,7 @@ pub struct Step {
     pub place: DVec3,
     /// The same point of the surface, its normals outwards.
     pub at: SurfacePoint,
-    /// One over its density [unit²].
+    /// One over its density \[unit²\].
     pub weight: f32,
 }
 

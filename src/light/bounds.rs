@@ -12,7 +12,7 @@ pub struct LightBounds {
     pub intensity: f64,
     /// Their normals.
     pub normals: Cone,
-    /// Angle from a normal beyond which nothing is sent [rad], at most π/2.
+    /// Angle from a normal beyond which nothing is sent \[rad\], at most π/2.
     pub falloff: f64,
     /// Whether the back shines like the front.
     pub two_sided: bool,
@@ -47,7 +47,7 @@ impl LightBounds {
 pub struct Cone {
     /// The axis.
     pub axis: DVec3,
-    /// The angle [rad]; π holds all.
+    /// The angle \[rad\]; π holds all.
     pub half: f64,
 }
 

@@ -43,7 +43,7 @@ pub trait Light: Send + Sync {
         None
     }
 
-    /// Area of its surface [unit²]; 0 without one.
+    /// Area of its surface \[unit²\]; 0 without one.
     fn area(&self) -> f64 {
         0.0
     }

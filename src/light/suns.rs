@@ -13,7 +13,7 @@ const BRIGHT: f64 = 4.0;
 /// Suns that add less than this to it are no trouble: a smooth sky has none.
 const TROUBLE: f64 = 0.5;
 
-/// The patches of a picture that are brighter than [`BRIGHT`], picked by what they send.
+/// The patches of a picture that are brighter than `BRIGHT`, picked by what they send.
 pub struct Suns {
     picture: Arc<Picture>,
     /// What each value of the picture stands for.
@@ -30,7 +30,7 @@ pub struct Suns {
     pub beside: f32,
     /// By what they send.
     mean_radiance: f32,
-    /// Of an even light with the same power and the same square of radiance [sr].
+    /// Of an even light with the same power and the same square of radiance \[sr\].
     pub solid_angle: f32,
 }
 
