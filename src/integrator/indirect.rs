@@ -233,6 +233,9 @@ impl Round<'_> {
         let key = self.key(plan, 2);
         self.tasks(self.of.count, rows, tally, |i, found| {
             let Some((at, w, flux)) = filler.arriving(first + i, &mut found.tally) else { return };
+            if flux.is_black() {
+                return;
+            }
             let flux = flux * (1.0 / self.of.count as f32);
             let mut draws = Draws::new(&[], hash_combine(key, i));
             let mirrored = reflectance(plan.body.eta, w.dot(at.n));
