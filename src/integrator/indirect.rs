@@ -114,10 +114,10 @@ impl Indirect {
         self.once
     }
 
-    /// Memory beside that of `samples` cached samples of `bodies` bodies, at its most [bytes].
+    /// Memory beside that of `samples` cached samples of `bodies` bodies [bytes], where half of the paths arrive.
     pub fn bytes(&self, bodies: u64, samples: u64) -> u64 {
         let paths = bodies * u64::from(self.count) * if self.surfaces.is_some() { 3 } else { 2 };
-        (samples + 4 * paths) * size_of::<CachedSample>() as u64
+        (samples + paths / 2) * size_of::<CachedSample>() as u64
     }
 
     /// Adds to the caches of pass number `pass`, which have the light that comes straight from the lights, all other light.

@@ -24,8 +24,8 @@ use std::sync::{Arc, Once};
 /// A cached sample, its columns twice while the tree is built, and its share of the tree.
 const BYTES_PER_SAMPLE: u128 = 256;
 
-/// What a sample was measured to take of that, with 2 million of them.
-const TAKEN_PER_SAMPLE: u64 = 180;
+/// What a sample was measured to take of that, with 0.2 to 1.6 million of them.
+const TAKEN_PER_SAMPLE: u64 = 150;
 
 /// L_o = T21 Σ S_d L_t / M + specular reflection, over a cache refilled each pass. Light passes between points of one
 /// object only; what enters is all light that arrives, or with no [`SubsurfaceOptions::bounces`] what comes straight from lights.
