@@ -1,10 +1,7 @@
 //! The long stream behind the sample cache.
 
+use super::sobol::{DIMENSIONS, reversed, scrambled};
 use crate::math::{hash_combine, unit_f32, unit_f64};
-use sobol_burley::parts::owen_scramble_rev;
-
-/// Dimensions of the stream.
-pub const DIMENSIONS: usize = 8;
 
 /// How the points of a [`CacheStream`] lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,47 +13,17 @@ pub enum Points {
     Independent,
 }
 
-/// Points of [0, 1)^8 by number. The sequence is ours because that of `sobol_burley`, whose scrambling it has, ends at 2^16 points;
-/// this one repeats after 2^32, then goes on with a new scramble.
-#[derive(Clone, Debug)]
+/// Points of [0, 1)^8 by number; after 2^32 of them a new scramble.
+#[derive(Clone, Copy, Debug)]
 pub struct CacheStream {
     points: Points,
     key: u64,
-    vectors: [[u32; 32]; DIMENSIONS],
 }
-
-/// Primitive polynomial (degree, inner coefficients) and first direction numbers of dimensions 2.. [Joe, Kuo 2008].
-const JOE_KUO: [(usize, u32, &[u32]); DIMENSIONS - 1] = [
-    (1, 0, &[1]),
-    (2, 1, &[1, 3]),
-    (3, 1, &[1, 3, 1]),
-    (3, 2, &[1, 1, 1]),
-    (4, 1, &[1, 1, 3, 3]),
-    (4, 4, &[1, 3, 5, 13]),
-    (5, 2, &[1, 1, 5, 5, 17]),
-];
 
 impl CacheStream {
     /// The stream of one object: `seed` of the render, `object` so that two objects do not share points.
     pub fn new(points: Points, seed: u64, object: u64) -> Self {
-        let mut vectors = [[0; 32]; DIMENSIONS];
-        vectors[0] = std::array::from_fn(|bit| 1 << (31 - bit));
-        for (v, (degree, inner, first)) in vectors[1..].iter_mut().zip(JOE_KUO) {
-            for bit in 0..32 {
-                v[bit] = if bit < degree {
-                    first[bit] << (31 - bit)
-                } else {
-                    let mut value = v[bit - degree] ^ (v[bit - degree] >> degree);
-                    for k in 1..degree {
-                        if inner >> (degree - 1 - k) & 1 == 1 {
-                            value ^= v[bit - k];
-                        }
-                    }
-                    value
-                };
-            }
-        }
-        Self { points, key: hash_combine(hash_combine(seed, 0x0063_6163_6865), object), vectors }
+        Self { points, key: hash_combine(hash_combine(seed, 0x0063_6163_6865), object) }
     }
 
     /// All dimensions of point number `index`, as 32 random bits each.
@@ -65,24 +32,13 @@ impl CacheStream {
         match self.points {
             Points::Sobol => std::array::from_fn(|d| {
                 let scramble = hash_combine(hash_combine(self.key, d as u64), index >> 32);
-                owen_scramble_rev(self.sobol(index as u32, d).reverse_bits(), scramble as u32).reverse_bits()
+                scrambled(reversed(index as u32, d), scramble as u32)
             }),
             Points::Independent => {
                 let key = hash_combine(self.key, index);
                 std::array::from_fn(|d| hash_combine(key, d as u64) as u32)
             }
         }
-    }
-
-    /// The Sobol sequence before scrambling.
-    #[inline]
-    fn sobol(&self, index: u32, dimension: usize) -> u32 {
-        let (mut bits, mut rest) = (0, index);
-        while rest != 0 {
-            bits ^= self.vectors[dimension][rest.trailing_zeros() as usize];
-            rest &= rest - 1;
-        }
-        bits
     }
 
     /// The numbers of point `index`: one in full precision for the area table, the others in f32.
@@ -120,18 +76,6 @@ mod tests {
                 let p = stream.point(i);
                 let cell = (u64::from(p[0]) >> (32 - a) << (10 - a) | u64::from(p[1]) >> (22 + a)) as usize;
                 assert!(!std::mem::replace(&mut seen[cell], true), "boxes 2^{a} x 2^{}", 10 - a);
-            }
-        }
-    }
-
-    /// Unscrambled, the first points are those of the published table's generator.
-    #[test]
-    fn direction_numbers_are_those_of_the_table() {
-        let stream = CacheStream::new(Points::Sobol, 0, 0);
-        let published = |i: u32, d: u32| sobol_burley::parts::sobol_rev(i.reverse_bits(), d).reverse_bits();
-        for d in 0..DIMENSIONS {
-            for i in [1, 2, 3, 5, 17, 1000, 65535] {
-                assert_eq!(stream.sobol(i, d) >> 16, published(i, d as u32) >> 16, "dimension {d}, point {i}");
             }
         }
     }

@@ -3,6 +3,7 @@
 
 mod cache_stream;
 mod pairs;
+mod sobol;
 mod stream;
 mod turn;
 mod warp;

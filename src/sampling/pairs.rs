@@ -1,10 +1,10 @@
 //! Many first pairs of a stream's numbers at once, and directions from them: what [`PixelStream::split`], `next_2d` and
 //! `cosine_hemisphere` give one by one, to the bit, in loops that the compiler vectorises.
 
+use super::sobol::two;
 use super::stream::PixelStream;
 use super::warp::hemisphere;
 use crate::math::{Kernel, Level, Vec3, dispatch_at};
-use sobol_burley::parts::{hash, owen_scramble_rev, u32_to_f32_norm};
 
 /// Where pairs stand in their sequences.
 #[derive(Clone, Debug, Default)]
@@ -69,7 +69,7 @@ impl Kernel for Numbers<'_> {
     #[inline(always)]
     fn run(self) {
         for ((index, seed), out) in self.index.iter().zip(self.seed).zip(self.out) {
-            *out = pair(*index, *seed);
+            *out = two(*index, *seed);
         }
     }
 }
@@ -95,7 +95,7 @@ impl Kernel for Directions<'_> {
             s[..seed.len()].copy_from_slice(seed);
             let (mut x, mut y, mut z) = ([0.0; TURN], [0.0; TURN], [0.0; TURN]);
             for k in 0..TURN {
-                let [u, v] = pair(i[k], s[k]);
+                let [u, v] = two(i[k], s[k]);
                 [x[k], y[k], z[k]] = hemisphere([u, v]);
             }
             for (k, out) in out.iter_mut().enumerate() {
@@ -103,22 +103,6 @@ impl Kernel for Directions<'_> {
             }
         }
     }
-}
-
-/// The first two dimensions of the Owen-scrambled Sobol sequence of `sobol_burley`: the first is the index itself, the
-/// second its product with Pascal's triangle modulo 2, which needs neither table nor loop.
-#[inline(always)]
-fn pair(index: u32, seed: u32) -> [f32; 2] {
-    let shuffled = owen_scramble_rev(index.reverse_bits(), hash(seed ^ 0x79c6_8e4a));
-    let first = shuffled.reverse_bits() & 0xffff;
-    let mut second = first;
-    second ^= (second & 0xaaaa) >> 1;
-    second ^= (second & 0xcccc) >> 2;
-    second ^= (second & 0xf0f0) >> 4;
-    second ^= (second & 0xff00) >> 8;
-    let seed = seed.wrapping_mul(0x9c8f_2d3b);
-    let number = |bits: u32, scramble: u32| u32_to_f32_norm(owen_scramble_rev(bits, hash(scramble)).reverse_bits());
-    [number(first, seed ^ 0x912f_69ba), number(second, seed ^ 0x174f_18ab)]
 }
 
 #[cfg(test)]
@@ -131,8 +115,10 @@ mod tests {
     fn pairs_are_the_numbers_of_the_streams() {
         let (mut pairs, mut expected) = (Pairs::default(), Vec::new());
         let n = Vec3::new(0.6, -0.64, 0.48);
-        // Also where parts go on into the next sequence of 2^16.
-        for (pixel, sample, parts) in [(0, 0, 1), (5, 17, 4), (1 << 20, 65_535, 3), (77, 9_362, 7), (8, 70_000, 33)] {
+        // Also where parts go on into the next sequence of 2^32.
+        for (pixel, sample, parts) in
+            [(0, 0, 1), (5, 17, 4), (1 << 20, u32::MAX, 3), (77, 613_566_756, 7), (8, 70_000, 33)]
+        {
             let mut stream = PixelStream::new(3, pixel, sample);
             stream.next_2d();
             pairs.push_splits(&stream, parts);

@@ -1,5 +1,6 @@
 //! The numbers of one sample of one pixel.
 
+use super::sobol;
 use crate::math::hash_combine;
 
 /// Owen-scrambled Sobol numbers [Burley 2020] of one pixel sample, in sets of four dimensions; each set of
@@ -12,14 +13,10 @@ pub struct PixelStream {
     dimension: u32,
 }
 
-/// `sobol_burley` tabulates 2^16 points; later samples start a new, independently scrambled sequence.
-const SEQUENCE_LENGTH: u32 = 1 << 16;
-
 impl PixelStream {
     /// The stream of sample number `sample` of pixel number `pixel`.
     pub fn new(seed: u64, pixel: u64, sample: u32) -> Self {
-        let key = hash_combine(hash_combine(seed, pixel), u64::from(sample / SEQUENCE_LENGTH));
-        Self { key, index: sample % SEQUENCE_LENGTH, dimension: 0 }
+        Self { key: hash_combine(seed, pixel), index: sample, dimension: 0 }
     }
 
     /// The next two dimensions, in [0, 1).
@@ -28,8 +25,11 @@ impl PixelStream {
         // A pair never straddles two sets of four, and a set costs little more than one of its dimensions.
         let first = self.dimension.next_multiple_of(2);
         self.dimension = first + 2;
-        let [a, b, c, d] = sobol_burley::sample_4d(self.index, 0, self.set_seed(first));
-        if first.is_multiple_of(4) { [a, b] } else { [c, d] }
+        if first.is_multiple_of(4) {
+            return sobol::two(self.index, self.set_seed(first));
+        }
+        let [_, _, c, d] = sobol::four(self.index, self.set_seed(first));
+        [c, d]
     }
 
     /// The next whole set of four dimensions, in [0, 1): stratified together.
@@ -37,13 +37,13 @@ impl PixelStream {
     pub fn next_4d(&mut self) -> [f32; 4] {
         let first = self.dimension.next_multiple_of(4);
         self.dimension = first + 4;
-        sobol_burley::sample_4d(self.index, 0, self.set_seed(first))
+        sobol::four(self.index, self.set_seed(first))
     }
 
     /// The next dimension, in [0, 1).
     #[inline]
     pub fn next_1d(&mut self) -> f32 {
-        let value = sobol_burley::sample(self.index, self.dimension % 4, self.set_seed(self.dimension));
+        let value = sobol::one(self.index, self.dimension as usize % 4, self.set_seed(self.dimension));
         self.dimension += 1;
         value
     }
@@ -61,8 +61,8 @@ impl PixelStream {
     pub fn split(&self, part: u32, parts: u32) -> Self {
         let index = u64::from(self.index) * u64::from(parts) + u64::from(part);
         let key = hash_combine(self.key, u64::from(self.dimension / 4) | 1 << 40);
-        let key = hash_combine(key, index / u64::from(SEQUENCE_LENGTH));
-        Self { key, index: (index % u64::from(SEQUENCE_LENGTH)) as u32, dimension: 0 }
+        // After 2^32 points a new sequence, scrambled on its own.
+        Self { key: hash_combine(key, index >> 32), index: index as u32, dimension: 0 }
     }
 
     /// Index and scramble of the first dimensions of a stream of which none was used; the first two are then.
@@ -79,11 +79,11 @@ impl PixelStream {
         let this = *self;
         (0..parts).map(move |part| {
             let index = first + u64::from(part);
-            let of = index / u64::from(SEQUENCE_LENGTH);
+            let of = index >> 32;
             if sequence != Some(of) {
                 (sequence, seed) = (Some(of), this.split(part, parts).set_seed(0));
             }
-            ((index % u64::from(SEQUENCE_LENGTH)) as u32, seed)
+            (index as u32, seed)
         })
     }
 
@@ -118,7 +118,7 @@ mod tests {
             [s.next_1d(), s.next_2d()[0], s.next_2d()[1]].map(f32::to_bits)
         };
         assert_eq!(numbers(1, 2, 3), numbers(1, 2, 3));
-        for other in [numbers(2, 2, 3), numbers(1, 3, 3), numbers(1, 2, 4), numbers(1, 2, 3 + (1 << 16))] {
+        for other in [numbers(2, 2, 3), numbers(1, 3, 3), numbers(1, 2, 4), numbers(1, 2, 3 + (1 << 31))] {
             assert_ne!(other, numbers(1, 2, 3));
         }
     }
