@@ -130,6 +130,11 @@ pub trait Bssrdf: Send + Sync {
     /// conserves energy.
     fn total(&self) -> Rgb;
 
+    /// What leaves through all faces of what it is a model of, per entered flux: of a sheet the other face too.
+    fn total_of_all_faces(&self) -> Rgb {
+        self.total()
+    }
+
     /// Whether the formula is below zero in places, where [`Self::eval`] has 0.
     fn clamps(&self) -> bool {
         false

@@ -304,6 +304,10 @@ impl Bssrdf for Slab {
         self.total_reflected
     }
 
+    fn total_of_all_faces(&self) -> Rgb {
+        self.total_reflected + self.total_transmitted
+    }
+
     fn clamps(&self) -> bool {
         true
     }

@@ -4,7 +4,7 @@ use super::balance::Known;
 use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, Scratch, Tuning};
 use crate::bssrdf::{Exit, ModelName, ModelOptions, Partition};
 use crate::geometry::SurfacePoint;
-use crate::math::{Rgb, Vec4};
+use crate::math::{Rgb, Vec3, Vec4};
 use crate::optics::FresnelMoments;
 use crate::sampling::{CacheStream, PixelStream, Points, cosine_hemisphere};
 use crate::scene::{Estimator, View};
@@ -21,19 +21,21 @@ const ERROR: f32 = 0.2;
 /// Points gathered together.
 const CHUNK: usize = 1024;
 
-/// The balance of the body of `plan`; a function of scene and seed. `None` for models of sheets, which have two faces, and where light comes no
-/// farther than to the next sample of a cache.
+/// Points at the most where the near part is gathered, and samples of it.
+const NEAR: [u32; 2] = [1 << 11, 1 << 18];
+
+/// What numbers of the directions of even light are for.
+const EVEN_LIGHT: u64 = 0x6576_656e;
+
+/// The balance of the body of `plan`; a function of scene and seed.
 pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let body = &plan.body;
     let samples = plan.samples.clamp(SAMPLES[0], SAMPLES[1]);
-    let count = samples / SAMPLES_PER_POINT;
+    let count = (samples / SAMPLES_PER_POINT).min(if plan.near.is_some() { NEAR[0] } else { u32::MAX });
     let surface = view.scene.surface(body.object).inside.as_ref()?;
-    if body.model.name() == ModelName::SLAB || plan.near.is_some() {
-        return None;
-    }
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
-    let own = body.model.total();
+    let own = body.model.total_of_all_faces();
     // What begins with light scattered twice competes with light scattered once too: the standard dipole has about the total of both.
     let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
@@ -53,7 +55,8 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     };
     let lit: Vec<CachedSample> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
     let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / body.table.area();
-    let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition: Partition::NONE };
+    let partition = plan.near.as_ref().map_or(Partition::NONE, |near| near.rest);
+    let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition };
     let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: samples }, &*body.model, tuning);
     let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(count)).map(|i| points.numbers(i)).collect();
     picks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
@@ -68,7 +71,11 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             };
             let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
             let mut sums = Vec::new();
-            plan.sum((&gatherer, Detail::Fine), &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
+            let (mut scratch, mut tally) = (Scratch::default(), Tally::default());
+            plan.unbalanced_sum((&gatherer, Detail::Fine), &points, &mut scratch, &mut tally, &mut sums);
+            for (point, sum) in points.iter().zip(&mut sums) {
+                *sum = *sum + near_part(plan, view, point, NEAR[1] / count, &mut tally);
+            }
             let divisor = |sum: &Rgb| {
                 let divisor = |c: usize| {
                     // Some models send out more than has entered.
@@ -82,4 +89,20 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
         })
         .collect();
     Some(Balance::new(known.into_iter().flatten().collect(), body.table.area(), body.table.centre()))
+}
+
+/// The mean of `count` samples of what even light close to `point` brings there.
+fn near_part(plan: &Plan, view: View<'_>, point: &GatherPoint, count: u32, tally: &mut Tally) -> Rgb {
+    let Some(near) = &plan.near else { return Rgb::BLACK };
+    let exit = Exit { x: Vec3::ZERO, ..point.exit };
+    let mut one = |k: u32| {
+        let numbers = point.stream.split(k, count);
+        let u = numbers.aside(EVEN_LIGHT).next_4d();
+        let step = near.step(view, plan.body.object, (point.place, exit.n), numbers, tally)?;
+        let at = SurfacePoint { n: step.at.n_geometric, ..step.at };
+        let w = cosine_hemisphere(at.n, [u[0], u[1]]);
+        let sample = plan.body.enters(&at, w, (Rgb::WHITE, step.weight), u[2])?;
+        Some(plan.near_part(near, &exit, &sample, (step.place - point.place).as_vec3(), tally))
+    };
+    (0..count).filter_map(&mut one).fold(Rgb::BLACK, |sum, part| sum + part) * (1.0 / count as f32)
 }

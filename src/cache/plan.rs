@@ -9,7 +9,7 @@ use crate::bssrdf::{Entry, Exit, Partition};
 use crate::error::Result;
 use crate::geometry::AreaTable;
 use crate::light::Lights;
-use crate::math::{Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::Medium;
 use crate::sampling::{CacheStream, Points, Turn};
 use crate::scene::{EntrySampling, Estimator, Scene, Spread, View};
@@ -215,8 +215,21 @@ impl Plan {
         }
     }
 
-    /// The sum over the cache at each of `points`, into `sums`.
+    /// The sum over the cache at each of `points`, balanced, into `sums`.
     pub fn sum(
+        &self,
+        cache: (&Gatherer, Detail),
+        points: &[GatherPoint],
+        scratch: &mut Scratch,
+        tally: &mut Tally,
+        sums: &mut Vec<Rgb>,
+    ) {
+        self.unbalanced_sum(cache, points, scratch, tally, sums);
+        self.balance(points, sums);
+    }
+
+    /// [`Self::sum`] as the model has it.
+    pub(super) fn unbalanced_sum(
         &self,
         (gatherer, detail): (&Gatherer, Detail),
         points: &[GatherPoint],
@@ -229,33 +242,42 @@ impl Plan {
         let kernel = (&*self.body.model, &self.envelope);
         Clock::time(&mut tally.clock.gather, || {
             gatherer.gather(kernel, (&exits, detail), &keys, scratch, &mut tally.gather, sums);
-            if let Some(Some(balance)) = self.balance.get() {
-                points.iter().zip(sums.iter_mut()).for_each(|(p, sum)| *sum = *sum * balance.at(p.place, p.exit.n));
-            }
         });
+    }
+
+    fn balance(&self, points: &[GatherPoint], sums: &mut [Rgb]) {
+        if let Some(Some(balance)) = self.balance.get() {
+            points.iter().zip(sums).for_each(|(p, sum)| *sum = *sum * balance.at(p.place, p.exit.n));
+        }
+    }
+
+    /// What the near part of light that leaves at a place with normal `n` is multiplied by.
+    pub fn balance_at(&self, place: DVec3, n: Vec3) -> Rgb {
+        self.balance.get().and_then(Option::as_ref).map_or(Rgb::WHITE, |balance| balance.at(place, n))
     }
 
     /// ∫∫ S_d T12 L_i cosθ_i dω dA at each of `points`, into `sums`.
     pub fn gather(
         &self,
         (view, lights): (View<'_>, &Lights),
-        (gatherer, detail): (&Gatherer, Detail),
+        cache: (&Gatherer, Detail),
         points: &[GatherPoint],
         scratch: &mut Scratch,
         tally: &mut Tally,
         sums: &mut Vec<Rgb>,
     ) {
-        self.sum((gatherer, detail), points, scratch, tally, sums);
+        self.unbalanced_sum(cache, points, scratch, tally, sums);
         if let Some(near) = &self.near {
             let even = Density::even();
             near.add(&self.filler(view, lights, &self.streams[0], &even), points, tally, sums);
         }
+        self.balance(points, sums);
     }
 }
 
 impl Plan {
     /// What the near part of S_d leaves of light that enters by `sample`, whose own place is nowhere, and leaves by `exit`, the way
-    /// from the exit to the entry being `way` [unit]: radiance under the boundary for a flux.
+    /// from the exit to the entry being `way` [unit]: radiance under the boundary for a flux, not balanced.
     pub fn near_part(&self, near: &NearField, exit: &Exit, sample: &CachedSample, way: Vec3, tally: &mut Tally) -> Rgb {
         let model = &*self.body.model;
         let moved = CachedSample { entry: Entry { x: way, ..sample.entry }, ..*sample };

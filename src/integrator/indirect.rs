@@ -16,13 +16,15 @@ use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::Ray;
 use crate::sampling::{CacheStream, PixelStream, Points, Turn, cosine_hemisphere};
 use crate::scene::Scene;
-use crate::tally::Tally;
+use crate::tally::{Cause, Tally};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// Paths of each kind in a pass for so many of its samples.
 const SAMPLES_PER_PATH: u32 = 8;
+/// Rounds in which light leaves bodies and meets them again. What is left then would go on without end.
+const MOST_ROUNDS: u32 = 1000;
 /// Paths of one task; exits of one task are neighbours, and gathered together.
 const CHUNK: usize = 1024;
 /// A round of fewer exits is made by chance, with more weight.
@@ -143,6 +145,13 @@ impl Indirect {
         let mut sources: Vec<Option<Cache>> = caches.to_vec();
         let whole: f64 = sources.iter().flatten().map(flux).sum();
         for level in 1..=self.bounces {
+            if level > MOST_ROUNDS {
+                for plan in plans.iter().flatten().filter(|p| sources[p.body.object as usize].is_some()) {
+                    tally.walk.walks += 1;
+                    tally.walk.losses.add(plan.body.object, Cause::Endless);
+                }
+                break;
+            }
             let mut rows: Rows = vec![Vec::new(); plans.len()];
             for (plan, source) in plans.iter().zip(&mut sources) {
                 if let (Some(plan), Some(source)) = (plan, source.take()) {
@@ -416,7 +425,8 @@ impl Round<'_> {
             flux: flux * (PI * step.weight),
         };
         let exit = Exit { x: Vec3::ZERO, n: out.n, w: away };
-        let passed = plan.near_part(near, &exit, &sample, (at.x - step.place).as_vec3(), &mut found.tally);
+        let passed = plan.near_part(near, &exit, &sample, (at.x - step.place).as_vec3(), &mut found.tally)
+            * plan.balance_at(step.place, exit.n);
         let left = passed * transmittance(plan.body.eta, away.dot(out.n));
         let chance = (left.max() / flux.max()).min(1.0);
         let goes_on = draws.number() < chance;

@@ -1,6 +1,5 @@
 //! What is said of paths that came where no light can be.
 
-use super::MOST_SURFACES;
 use crate::scene::{ObstacleKind, Scene};
 use crate::tally::{Cause, WalkTally};
 use crate::words::{counted, digits, either};
@@ -66,9 +65,10 @@ fn why(scene: &Scene, name: &str, cause: Cause) -> String {
                 )
             }
         }
-        Cause::Endless => format!(
-            "nothing absorbed them on {MOST_SURFACES} surfaces in a row: an albedo below 1, some sigma_a or an opening lets them end"
-        ),
+        Cause::Endless => {
+            "nothing absorbed them, surface after surface: an albedo below 1, some sigma_a or an opening lets them end"
+                .into()
+        }
         Cause::Rounding => {
             "rounding put them on the other side of its surface: make what is thinnest thicker, or bring \
                             what is far away nearer"

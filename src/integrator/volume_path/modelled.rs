@@ -302,7 +302,8 @@ impl CameraPath<'_> {
         let entry = SurfacePoint { n: entry.n_geometric, ..entry };
         let w = cosine_hemisphere(entry.n, self.draws.pair());
         let sample = plan.body.enters(&entry, w, (Rgb::splat(PI), weight), self.draws.number())?;
-        let passed = plan.near_part(near, &exit, &sample, (place - at.x).as_vec3(), self.tally);
+        let passed =
+            plan.near_part(near, &exit, &sample, (place - at.x).as_vec3(), self.tally) * plan.balance_at(at.x, exit.n);
         let before = self.spectrum.value_outside().max();
         self.spectrum.scale(passed);
         let left = self.spectrum.value_outside().max();
