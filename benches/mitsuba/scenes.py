@@ -148,6 +148,10 @@ def bodies():
     add("coloured_area", "extinction 0.5 to 15, area lamp", "volume_path", [floor(), (CUBE, COLOURED), ceiling_lamp(3, 2)])
     add("sheet", "thin sheet, lamp behind", "volume_path", [floor(), (box((-1.2, 0.05, -0.1), (1.2, 2.4, 0.1), 20), WAX), back_lamp()])
     add("below_1", "eta 0.75, picture", "volume_path", [floor(), (BALL, medium(2, (0.02, 0.1, 0.3), 0.4, 0.75))], SOFT)
+    add("void_channel", "red meets hardly anything, green does not absorb; picture", "volume_path", [floor(), (BALL, medium((0.001, 1.5, 4), (0, 0, 0.5), 0.2, 1.3))], SOFT)
+    add("dense_index", "eta 2, g = -0.7, picture", "volume_path", [floor(), (CUBE, medium((2, 1, 0.5), (0.02, 0.1, 0.2), -0.7, 2.0))], SOFT)
+    add("needle", "g = 0.95, area lamp, even sky", "volume_path", [floor(), (BALL, medium(40, (0.02, 0.1, 0.5), 0.95, 1.4)), ceiling_lamp(3, 2)], 0.3)
+    add("sunk", "a cube sunk in the floor", "volume_path", [floor(), (box((-0.9, -0.6, -0.9), (0.9, 1.2, 0.9), 30), JELLY)], SOFT)
     add("two_bodies", "milk beside wax, picture", "volume_path", [floor(), (ball((-0.8, 0.8, 0), 0.75), MILK), (box((0.1, 0.05, -0.6), (1.3, 1.25, 0.6), 20), WAX)], SOFT)
     add("glass_beside", "glass beside milk in a closed room", "volume_path", room() + [(ball((-0.9, 0.9, 0.4), 0.8), clear(1.5)), (ball((0.9, 0.9, 0), 0.85), MILK), ceiling_lamp(3, 2, 4.9)])
 
@@ -160,6 +164,7 @@ def nested():
     add("lamp_in_jelly", "lamp in a medium", "volume_path", [floor(), (CUBE, JELLY), (ball((0, 0.95, 0), 0.4), lamp((2, 3, 4)), 1)])
     add("shells", "glass, milk, glass, wax in one another", "volume_path", [floor(), (BALL, clear(1.4)), (ball((0, 1.05, 0), 0.85), JELLY, 1), (ball((0, 1.05, 0), 0.6), clear(1.5, 0.2), 2), (ball((0, 1.05, 0), 0.4), WAX, 3)], SOFT)
     add("camera_in_glass", "the camera in a clear body of eta 1.3 that has an opaque cube in it", "volume_path", [floor(), (box((-3.5, 0.02, -3.5), (3.5, 5, 9)), clear(1.3, (0.05, 0.02, 0.01))), (CUBE, matt(0.6), 1)], SOFT, inside=1)
+    add("camera_in_jelly", "the camera in a medium of eta 1.35 that has an opaque cube in it", "volume_path", [floor(), (box((-3.5, 0.02, -3.5), (3.5, 5, 9)), medium((0.08, 0.06, 0.04), (0.01, 0.02, 0.03), 0.5, 1.35)), (CUBE, matt(0.6), 1)], SOFT, inside=1)
     lower, upper = box((-0.9, 0.05, -0.9), (0.9, 1.0, 0.9), 30), box((-0.9, 1.0, -0.9), (0.9, 1.9, 0.9), 30)
     without = lambda mesh, lid: (mesh[0], [f for f in mesh[1] if f not in lid])
     faces = [(floor()[0], matt(0.5), None), (without(lower, LID), 1, None), (without(upper, BASE), 2, None), ((lower[0], LID), 1, 2)]

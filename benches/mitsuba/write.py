@@ -65,7 +65,7 @@ def mitsuba_medium(m):
         return None
     phase = {"type": "hg", "g": m["g"]} if m.get("g") else {"type": "isotropic"}
     scale = float((s + a).max())  # its colours are at most 1
-    return {"type": "homogeneous", "albedo": spectrum(s / (s + a)), "sigma_t": spectrum((s + a) / scale), "scale": scale, "phase": phase}
+    return {"type": "homogeneous", "albedo": spectrum(s / np.where(s + a > 0, s + a, 1)), "sigma_t": spectrum((s + a) / scale), "scale": scale, "phase": phase}
 
 
 def opaque(m):
@@ -74,9 +74,14 @@ def opaque(m):
     return {"bsdf": {"type": "diffuse", "reflectance": spectrum([0, 0, 0])}, "emitter": {"type": "area", "radiance": spectrum(m["radiance"])}}
 
 
-def mitsuba_scene(scene, folder, size, integrator=None):
-    """Roulette is off where there are media: Mitsuba's ends a path with 5 % at every collision whatever its weight, and of a
-    path in milk with hundreds of them nothing is left but rare bright samples."""
+NO_ROULETTE = 1000000
+# Of media. Without roulette: Mitsuba's ends a path with 5 % at least at every collision, whatever its weight, and of a path in milk
+# with hundreds of them nothing is left but rare bright samples. The others are for the comparison of cost: the best of them counts.
+SETTINGS = {"mitsuba": {"type": "volpathmis", "rr_depth": NO_ROULETTE}, "mitsuba-roulette": {"type": "volpathmis"},
+            "mitsuba-plain": {"type": "volpath", "rr_depth": NO_ROULETTE}, "mitsuba-plain-roulette": {"type": "volpath"}}
+
+
+def mitsuba_scene(scene, folder, size, setting="mitsuba", integrator=None):
     objects = scene["objects"]
     bodies = [m["kind"] in ("medium", "clear") for _, m, _ in objects]
     media = {i: mitsuba_medium(m) for i, (_, m, _) in enumerate(objects) if bodies[i]}
@@ -108,6 +113,6 @@ def mitsuba_scene(scene, folder, size, integrator=None):
     elif scene["sky"] is not None:
         out["sky"] = {"type": "constant", "radiance": spectrum([scene["sky"]] * 3)}
     plain = {"type": "path", "max_depth": -1 if scene["bounces"] is None else scene["bounces"] + 2}
-    volume = {"type": "volpathmis", "max_depth": -1, "rr_depth": 1000000}
+    volume = dict(SETTINGS[setting], max_depth=-1)
     out["integrator"] = integrator or (volume if medium_ref else plain)
     return out
