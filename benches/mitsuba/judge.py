@@ -115,6 +115,8 @@ def bias(out, seed):
             mask = np.load(out / name / "mask.npy")
             h, w = mask.shape
             on = mask.reshape(h // BLOCK, BLOCK, w // BLOCK, BLOCK).mean((1, 3)) >= 0.5
+            if not on.any():
+                continue
             pick = lambda run: blocks(run["pictures"]).reshape(len(run["pictures"]), -1, 3)[:, on.ravel()]
             s, m, o = pick(s), pick(m), pick(o)
             variance = lambda x: x.var(0, ddof=1) / len(x)
