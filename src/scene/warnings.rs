@@ -24,7 +24,7 @@ pub(super) fn of(file: &SceneFile, scene: &Scene) -> Vec<String> {
 
 fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
     let mut used = vec![false; file.materials.len()];
-    scene.objects.iter().for_each(|o| used[o.material] = true);
+    file.objects.iter().for_each(|o| used[o.material] = true);
     for (i, entry) in file.materials.iter().enumerate() {
         let head = format!("{}: material {:?}", entry.at, entry.name);
         if !used[i] {

@@ -50,6 +50,8 @@ pub struct Object {
     pub findings: Findings,
     /// Where bodies overlap, the one of the higher priority is there.
     pub priority: i32,
+    /// Thickness of the sheet that was made of an open mesh \[unit\]; `None` where the mesh is as in the file.
+    pub sheet: Option<f64>,
 }
 
 /// A surface by name.
