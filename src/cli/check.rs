@@ -131,7 +131,10 @@ fn tell(scene: &Scene, object: &Object, share: f64) {
         }
     );
     if let Some(thickness) = object.sheet {
-        println!("    a sheet {} units thick, its mesh the middle: both faces and the rim are counted", short(thickness));
+        println!(
+            "    a sheet {} units thick, its mesh the middle: both faces and the rim are counted",
+            short(thickness)
+        );
     }
     println!(
         "    area {} unit²; material {}: {}",

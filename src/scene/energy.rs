@@ -208,7 +208,16 @@ mod tests {
     fn object(mesh: &crate::geometry::ObjMesh) -> Object {
         let mesh = mesh.recentred(DVec3::ZERO);
         let findings = examine(&mesh);
-        Object { name: String::new(), mesh, at: String::new(), material: 0, flipped: false, findings, priority: 0, sheet: None }
+        Object {
+            name: String::new(),
+            mesh,
+            at: String::new(),
+            material: 0,
+            flipped: false,
+            findings,
+            priority: 0,
+            sheet: None,
+        }
     }
 
     /// Six rectangles, their corners at the same places.

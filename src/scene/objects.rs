@@ -73,7 +73,8 @@ named! {
     Smooth = "smooth"
 }
 
-const COMMON: [&str; 9] = ["name", "mesh", "shape", "material", "normals", "flip", "priority", "thickness", "transform"];
+const COMMON: [&str; 9] =
+    ["name", "mesh", "shape", "material", "normals", "flip", "priority", "thickness", "transform"];
 
 const PRIORITY: &str = "a whole number; the higher one wins where bodies overlap";
 

@@ -75,12 +75,19 @@ fn no_sheet(entry: &ObjectEntry, thickness: f64, why: NoSheet) -> Error {
         ),
         NoSheet::OneSided(at) => refused(
             entry,
-            format_args!("it has one side only, as a Möbius band: its faces cannot agree about their front {}", near(at)),
+            format_args!(
+                "it has one side only, as a Möbius band: its faces cannot agree about their front {}",
+                near(at)
+            ),
             "cut it open along a line",
         ),
         NoSheet::Bends(at) => refused(
             entry,
-            format_args!("it bends with a radius below half its thickness, {} units, {}", short(0.5 * thickness), near(at)),
+            format_args!(
+                "it bends with a radius below half its thickness, {} units, {}",
+                short(0.5 * thickness),
+                near(at)
+            ),
             "take a smaller `thickness`, or bend it less there",
         ),
     }
@@ -150,7 +157,10 @@ pub(super) fn materials(file: &SceneFile, said: &mut Vec<String>) -> Result<(Vec
             if t.model == ModelName::SLAB && file.method.name != Some(MethodName::VolumePath) {
                 let within = |e: Error| {
                     let other = "take another model, or method `volume_path`";
-                    Error::scene(format!("{}: object {:?}: material {:?}: {e}; {other}", entry.at, entry.name, material.name))
+                    Error::scene(format!(
+                        "{}: object {:?}: material {:?}: {e}; {other}",
+                        entry.at, entry.name, material.name
+                    ))
                 };
                 t.build().map_err(within)?;
             }
