@@ -68,17 +68,17 @@ fn a_sheet_has_the_light_of_a_slab_by_paths_and_by_its_model() {
     let (reflected, transmitted) = (0.668_812, 0.313_247);
     let (passed, mirrored) = (f64::from(transmittance(1.3, 1.0)), f64::from(reflectance(1.3, 1.0)));
     let medium = translucent("m", "sigma_s_prime = 0.999\nsigma_a = 0.001\neta = 1.3\nmodel = \"slab\"");
-    let sheet = thick(&wide(80.0, "m"), 5.0);
-    let behind = load(&(above() + &sheet + &below(80.0, -3.0, "lamp") + &medium + &emissive("lamp", 1.0)));
-    let front = load(&(above() + &sheet + &below(80.0, -3.0, "black") + &medium + &diffuse("black", 0.0) + &sky(1.0)));
+    let sheet = thick(&wide(24.0, "m"), 5.0);
+    let behind = load(&(above() + &sheet + &below(24.0, -2.6, "lamp") + &medium + &emissive("lamp", 1.0)));
+    let front = load(&(above() + &sheet + &below(24.0, -2.6, "black") + &medium + &diffuse("black", 0.0) + &sky(1.0)));
     // The lamp and the sheet do not mirror each other: the lamp reflects nothing.
-    agree(traced(&behind, 400), (passed * transmitted, 0.0), WITHIN, "transmitted, paths");
-    agree(traced(&front, 200), (passed * reflected + mirrored, 0.0), WITHIN, "reflected, paths");
+    agree(traced(&behind, 256), (passed * transmitted, 0.0), WITHIN, "transmitted, paths");
+    agree(traced(&front, 160), (passed * reflected + mirrored, 0.0), WITHIN, "reflected, paths");
     let model = Slab::new(&behind.materials[0].surface.medium().unwrap(), 5.0, true).unwrap();
     let [r, t] = [model.total()[0], model.total_transmitted()[0]].map(f64::from);
     assert!((r / reflected - 1.0).abs() < 0.02 && (t / transmitted - 1.0).abs() < 0.02, "{r} {t}");
-    agree(modelled(&behind, 16), (passed * t, 0.0), WITHIN, "transmitted, slab");
-    agree(modelled(&front, 16), (passed * r + mirrored, 0.0), WITHIN, "reflected, slab");
+    agree(modelled(&behind, 24), (passed * t, 0.0), WITHIN, "transmitted, slab");
+    agree(modelled(&front, 24), (passed * r + mirrored, 0.0), WITHIN, "reflected, slab");
 }
 
 /// The closed box of the same size is the same body, to paths and to every model.

@@ -21,6 +21,11 @@ pub struct Path {
 }
 
 impl Path {
+    /// What to say of `scene` before it is rendered: light that may not be found.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        self.paths.warnings(scene)
+    }
+
     /// Over at most `bounces` surfaces after the first; as many as it takes if absent.
     ///
     /// # Errors
@@ -43,8 +48,10 @@ impl Integrator for Path {
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = camera_hits(view, rays, tally);
         let mut scratch = Scratch::default();
+        let inside = self.paths.camera_is_inside();
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
+                _ if inside => self.paths.seen_from_inside(view, ray, &mut scratch, tally),
                 None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) => self.paths.seen(view, ray, hit, &mut scratch, tally),
             };

@@ -72,7 +72,12 @@ impl Subsurface {
 
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        self.indirect.as_ref().map_or(Vec::new(), |indirect| indirect.paths.warnings(scene))
+        if let Some(indirect) = &self.indirect {
+            return indirect.paths.warnings(scene);
+        }
+        let black = "`subsurface` without light over other surfaces (`bounces = 0`, `--as-notes`) shows clear bodies black, and lets no \
+                     light through; leave that out, or take --method volume_path";
+        if has_clear(scene) { vec![black.into()] } else { Vec::new() }
     }
 
     /// Number of bodies with a near field.
@@ -126,8 +131,10 @@ impl Subsurface {
         tally: &mut Tally,
     ) {
         let (mut paths, mut asked) = (PathScratch::default(), Vec::new());
+        let inside = indirect.paths.camera_is_inside();
         for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
             out[i] = match hit {
+                _ if inside => indirect.paths.seen_from_inside(view, ray, &mut paths, tally),
                 None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) if view.scene.surface(hit.mesh).is_opaque() => {
                     let (at, albedo) = (view.point(hit, ray.ray.direction), self.albedo[hit.mesh as usize]);
@@ -219,6 +226,11 @@ fn lets_light_through(scene: &Scene, object: u32, medium: &Medium) -> bool {
 /// Dents no deeper than this share of a body are rounding: four corners of a plane face are not in one plane.
 const ROUNDING: f64 = 1e-6;
 
+/// Whether there is a clear body.
+fn has_clear(scene: &Scene) -> bool {
+    scene.objects.iter().any(|o| scene.materials[o.material].surface.clear.is_some())
+}
+
 /// Whether any light comes over another surface: not where one convex body stands alone among lights.
 fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOptions) -> bool {
     if options.bounces == 0 {
@@ -228,6 +240,9 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
         let surface = &scene.materials[o.material].surface;
         modelled[*i].is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
     };
+    if has_clear(scene) {
+        return true;
+    }
     let mut all = scene.objects.iter().enumerate().filter(reflects);
     match (all.next(), all.next()) {
         (None, _) => false,
