@@ -148,7 +148,7 @@ fn a_lamp_behind_glass_lights_a_body_as_volume_path_says() {
         rendering::load_in(folder.path(), &text(glass))
     };
     let [bare, covered] = [scene(false), scene(true)];
-    let [paths, models] = [[&bare, &covered].map(|s| traced(s, 64)), [&bare, &covered].map(|s| modelled(s, 64))];
+    let [paths, models] = [[&bare, &covered].map(|s| traced(s, 256)), [&bare, &covered].map(|s| modelled(s, 64))];
     let ratio = |[bare, covered]: [(f64, f64); 2]| {
         let ratio = covered.0 / bare.0;
         (ratio, ratio * (covered.1 / covered.0).hypot(bare.1 / bare.0))

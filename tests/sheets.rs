@@ -185,7 +185,7 @@ fn what_makes_no_sheet_is_refused_by_name() {
     // Two leaves of a hairpin 0.1 apart, around a bend of radius 0.05; in steps of 15 degrees.
     let hairpin = grid([14, 2], |u, v| {
         let turn = (14.0 * u - 1.0).clamp(0.0, 12.0) / 12.0 * PI;
-        let out = if u < 0.05 || u > 0.95 { 1.0 } else { 0.0 };
+        let out = if (0.05..=0.95).contains(&u) { 0.0 } else { 1.0 };
         [0.05 * turn.sin() - out, -0.05 * turn.cos(), v]
     });
     // The same with a wide bend, its leaves brought together above it.
@@ -193,16 +193,13 @@ fn what_makes_no_sheet_is_refused_by_name() {
         let (sin, cos) = (4.0 * PI * u).sin_cos();
         [(0.5 + 0.1 * u) * cos, (0.5 + 0.1 * u) * sin, v]
     });
-    let moebius = {
-        let strip = grid([24, 2], |u, v| {
-            let (s, c) = (2.0 * PI * u).sin_cos();
-            let (across, up) = ((PI * u).cos() * 0.6 * (v - 0.5), (PI * u).sin() * 0.6 * (v - 0.5));
-            // The last row is the first one, turned over.
-            let snap = |x: f64| (x * 1e9).round() / 1e9 + 0.0;
-            [snap((1.0 + across) * c), snap((1.0 + across) * s), snap(up)]
-        });
-        strip
-    };
+    let moebius = grid([24, 2], |u, v| {
+        let (s, c) = (2.0 * PI * u).sin_cos();
+        let (across, up) = ((PI * u).cos() * 0.6 * (v - 0.5), (PI * u).sin() * 0.6 * (v - 0.5));
+        // The last row is the first one, turned over.
+        let snap = |x: f64| (x * 1e9).round() / 1e9 + 0.0;
+        [snap((1.0 + across) * c), snap((1.0 + across) * s), snap(up)]
+    });
     let fin = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 2 1 4\nf 1 2 5\n";
     let twice = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 1 2\n";
     let cases = [

@@ -1,6 +1,7 @@
-//! Path tracing over opaque surfaces: light from lamps and environment by any number of reflections.
+//! Path tracing over opaque surfaces and through clear bodies: light from lamps and environment by any number of reflections.
 
 use super::direct::lambertian_albedos;
+use super::parts::clear_bodies;
 use super::shade::DirectLight;
 use super::volume_path::{Scratch, VolumePath};
 use super::{CameraRay, Integrator, KnownLights, MOST_SURFACES, Part, View, camera_hits};
@@ -69,6 +70,7 @@ impl Integrator for Path {
             None => "over as many surfaces as it takes, by Russian roulette".into(),
         };
         parts.push(Part::built("paths", over));
+        parts.extend(clear_bodies(scene));
         let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
         let why = if translucent {
             "`path` shows translucent surfaces as Lambertian ones of the same reflectance"

@@ -2,7 +2,7 @@
 
 use super::direct::lambertian_albedos;
 use super::indirect::{Indirect, OVER};
-use super::parts::of_cache;
+use super::parts::{clear_bodies, of_cache};
 use super::shade::DirectLight;
 use super::single::Single;
 use super::volume_path::{Asked, Modelled, Scratch as PathScratch};
@@ -77,7 +77,7 @@ impl Subsurface {
         }
         let black = "`subsurface` without light over other surfaces (`bounces = 0`, `--as-notes`) shows clear bodies black, and lets no \
                      light through; leave that out, or take --method volume_path";
-        if has_clear(scene) { vec![black.into()] } else { Vec::new() }
+        if scene.has_clear_bodies() { vec![black.into()] } else { Vec::new() }
     }
 
     /// Number of bodies with a near field.
@@ -226,11 +226,6 @@ fn lets_light_through(scene: &Scene, object: u32, medium: &Medium) -> bool {
 /// Dents no deeper than this share of a body are rounding: four corners of a plane face are not in one plane.
 const ROUNDING: f64 = 1e-6;
 
-/// Whether there is a clear body.
-fn has_clear(scene: &Scene) -> bool {
-    scene.objects.iter().any(|o| scene.materials[o.material].surface.clear.is_some())
-}
-
 /// Whether any light comes over another surface: not where one convex body stands alone among lights.
 fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOptions) -> bool {
     if options.bounces == 0 {
@@ -240,7 +235,7 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
         let surface = &scene.materials[o.material].surface;
         modelled[*i].is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
     };
-    if has_clear(scene) {
+    if scene.has_clear_bodies() {
         return true;
     }
     let mut all = scene.objects.iter().enumerate().filter(reflects);
@@ -325,6 +320,7 @@ impl Integrator for Subsurface {
         for (object, plan) in scene.objects.iter().zip(&self.plans) {
             parts.extend(plan.iter().flat_map(|plan| of_cache(plan, &object.name, self.options.estimator)));
         }
+        parts.extend(self.indirect.as_ref().and_then(|_| clear_bodies(scene)));
         parts.push(match &self.indirect {
             Some(indirect) => indirect.part(),
             None if self.options.bounces == 0 => {

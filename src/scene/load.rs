@@ -85,9 +85,8 @@ impl Scene {
         // From here on: the gap between two surfaces depends on what rays are traced in.
         said.extend(warnings::of(file, &scene));
         let method = file.method.name.unwrap_or_else(|| scene.default_method());
-        let clear = scene.objects.iter().any(|o| scene.materials[o.material].surface.clear.is_some());
-        let models_or_paths =
-            matches!(method, MethodName::Subsurface | MethodName::VolumePath) || method == MethodName::Path && clear;
+        let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath)
+            || method == MethodName::Path && scene.has_clear_bodies();
         for (number, what) in choice.beyond {
             let entry = &file.objects[number];
             // What encloses nothing is not too thin besides, where that is said.

@@ -25,7 +25,7 @@ pub fn clear_bodies(scene: &Scene) -> Vec<Option<Body>> {
 /// The clear bodies that the camera stands in.
 pub fn camera_in(scene: &Scene) -> Stack {
     let clear = |object: u32| scene.surface(object).clear.is_some();
-    if !(0..scene.objects.len() as u32).any(clear) {
+    if !scene.has_clear_bodies() {
         return Stack::default();
     }
     let around: Vec<(u32, u32)> = scene.camera_in().iter().copied().filter(|(object, _)| clear(*object)).collect();
