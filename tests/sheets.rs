@@ -77,7 +77,11 @@ fn a_sheet_has_the_light_of_a_slab_by_paths_and_by_its_model() {
     let model = Slab::new(&behind.materials[0].surface.medium().unwrap(), 5.0, true).unwrap();
     let [r, t] = [model.total()[0], model.total_transmitted()[0]].map(f64::from);
     assert!((r / reflected - 1.0).abs() < 0.02 && (t / transmitted - 1.0).abs() < 0.02, "{r} {t}");
-    agree(modelled(&behind, 24), (passed * t, 0.0), WITHIN, "transmitted, slab");
+    // Beside the model comes what is not scattered at all, 0.7 %, which a model's own total has once more.
+    let straight = passed * passed * (-5.0_f64).exp();
+    let found = modelled(&behind, 24);
+    agree(found, (passed * t + straight, 0.0), WITHIN, "transmitted, slab");
+    assert!((found.0 / (passed * transmitted) - 1.0).abs() < 0.03, "{found:?}");
     agree(modelled(&front, 24), (passed * r + mirrored, 0.0), WITHIN, "reflected, slab");
 }
 

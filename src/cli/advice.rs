@@ -280,7 +280,7 @@ impl<'a> Advice<'a> {
     }
 }
 
-const GIVE_THICKNESS: &str = "give it a `thickness` (a key of the object), or a closed mesh: both faces and the rim";
+const GIVE_THICKNESS: &str = "give it a thickness: that of the object, or a closed mesh, both faces and the rim";
 const WELD: &str = "weld its corners: --repair";
 const TURN: &str = "turn its faces: --repair, or flip = true in the scene";
 const TRACE: &str = "--method volume_path";

@@ -273,7 +273,11 @@ fn seams(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &st
             "an open sheet has no inside ({} to one triangle alone; the openings are {share} of its surface)",
             counted(edges, "edge belongs", "edges belong")
         );
-        say(ObstacleKind::Sheet, what, "set the object's `thickness`, or close the openings of a solid body");
+        say(
+            ObstacleKind::Sheet,
+            what,
+            "give it a thickness (the key of the object), or close the openings of a solid body",
+        );
     } else if edges > 0 {
         let what = counted(edges, "edge is the rim of a hole", "edges are rims of holes");
         say(ObstacleKind::Holes, format!("{what}, {share} of its surface"), "close them");
