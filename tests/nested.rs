@@ -314,13 +314,21 @@ fn a_body_inside_a_stronger_one_is_named() {
 /// What does not show clear bodies says so; a scene of clear bodies alone is traced unless another method is asked for.
 #[test]
 fn methods_without_clear_bodies_say_so() {
-    for (method, told) in
-        [("", false), ("volume_path", false), ("subsurface", true), ("direct", true), ("ambient_occlusion", false)]
-    {
+    for (method, told) in [
+        ("", false),
+        ("volume_path", false),
+        ("path", false),
+        ("subsurface", false),
+        ("direct", true),
+        ("ambient_occlusion", false),
+    ] {
         let asked = if method.is_empty() { String::new() } else { format!("[method]\nname = \"{method}\"") };
         let head = format!("{}\n{WHITE}{asked}", eye([0.0, 0.0, 9.0]));
         let scene = scene(&head, &[(ball([0.0; 3], 1.0), "glass", "")], MEDIA);
-        let said = scene.warnings.iter().any(|w| w.contains("\"glass\"") && w.contains("take --method volume_path"));
+        let said = scene
+            .warnings
+            .iter()
+            .any(|w| w.contains("\"glass\"") && w.contains("take --method path, or --method volume_path"));
         assert_eq!(said, told, "{method}: {:?}", scene.warnings);
         assert_eq!(scene.default_method().name(), "volume_path");
     }

@@ -240,7 +240,9 @@ impl<'a> Advice<'a> {
         if model.calibrated {
             words.push(set("calibrated", "true"));
         }
-        words.extend(model.thickness.map(|t| set("thickness", &short(f64::from(t)))));
+        // A sheet has told its own.
+        let told = self.prepared.scene.objects[t.index as usize].sheet.is_some();
+        words.extend(model.thickness.filter(|_| !told).map(|t| set("thickness", &short(f64::from(t)))));
         let notes = if self.prepared.as_notes { " in place of --as-notes" } else { "" };
         words.join(" ") + notes
     }
@@ -278,7 +280,7 @@ impl<'a> Advice<'a> {
     }
 }
 
-const GIVE_THICKNESS: &str = "give it a thickness: a closed mesh, both faces and the rim";
+const GIVE_THICKNESS: &str = "give it a thickness: that of the object, or a closed mesh, both faces and the rim";
 const WELD: &str = "weld its corners: --repair";
 const TURN: &str = "turn its faces: --repair, or flip = true in the scene";
 const TRACE: &str = "--method volume_path";

@@ -130,6 +130,12 @@ fn tell(scene: &Scene, object: &Object, share: f64) {
             share => format!("{} of the picture", percent(share)),
         }
     );
+    if let Some(thickness) = object.sheet {
+        println!(
+            "    a sheet {} units thick, its mesh the middle: both faces and the rim are counted",
+            short(thickness)
+        );
+    }
     println!(
         "    area {} unit²; material {}: {}",
         short(area),
@@ -263,6 +269,7 @@ fn object_json(scene: &Scene, object: &Object, share: f64) -> Value {
         "in_picture": share,
         "material": material.name,
         "surface": describe(&material.surface).join(", "),
+        "thickness": object.sheet,
         "findings": object.findings,
         "remarks": scene.remarks(object),
     })

@@ -16,6 +16,7 @@ mod obj_remarks;
 mod polygon;
 mod polygon_fill;
 mod shapes;
+mod sheet;
 mod solid;
 #[cfg(test)]
 mod test_shapes;
@@ -36,5 +37,6 @@ pub use obj::{load_obj, write_obj};
 pub use obj_lines::LOADING_BYTES;
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};
+pub use sheet::{Blunted, MITER_LIMIT, NoSheet, Thick, thickened};
 pub use solid::{Part, Seams, Solid};
 pub use weld::Seam;

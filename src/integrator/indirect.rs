@@ -42,7 +42,7 @@ pub const OVER: &str = "light over other surfaces";
 pub struct Indirect {
     /// Paths from the camera.
     pub paths: VolumePath,
-    /// Paths backwards from places of entry; `None` where no opaque surface reflects.
+    /// Paths backwards from places of entry; `None` where no opaque surface reflects, and no clear body stands.
     surfaces: Option<VolumePath>,
     bounces: u32,
     /// Paths of each kind in a pass, for each body at most.
@@ -82,7 +82,7 @@ impl Indirect {
         let bounces = options.bounces.min(MOST_SURFACES);
         let reflects = |o: &crate::scene::Object| {
             let surface = &scene.materials[o.material].surface;
-            surface.is_opaque() && !surface.bsdf.albedo().is_black()
+            surface.clear.is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
         };
         let surfaces = scene.objects.iter().any(reflects) && plans.iter().any(Option::is_some);
         let own = hash_combine(seed, PURPOSE);
@@ -219,7 +219,8 @@ impl Round<'_> {
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { return };
             found.tally.rays.bounce += 1;
             let Some(hit) = self.view.rays.closest(&ray) else { return };
-            if !self.view.scene.surface(hit.mesh).is_opaque() {
+            let surface = self.view.scene.surface(hit.mesh);
+            if !surface.is_opaque() && surface.clear.is_none() {
                 return;
             }
             let mut draws = Draws::new(&[u[4], u[0], u[3]], hash_combine(key, i));
@@ -355,9 +356,11 @@ impl Round<'_> {
                 (ray, flux) = next;
                 continue;
             }
-            // Clear bodies are shown by `volume_path` alone.
-            if !surface.is_opaque() {
-                return;
+            if surface.clear.is_some() {
+                let (way, tally) = ((&hit, ray.direction), &mut found.tally);
+                let Some(next) = self.of.paths.past_clear(self.view, way, flux, &mut draws, tally) else { return };
+                (ray, flux) = next;
+                continue;
             }
             let Some(next) = surface.bsdf.sample(&at, w, [draws.number(), draws.number(), draws.number()]) else {
                 return;

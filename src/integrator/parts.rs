@@ -81,3 +81,9 @@ fn near_field(plan: &Plan, name: &str, estimator: Estimator) -> Part {
         (None, _) => Part::left_out(part, "light comes farther than from one cached sample to the next"),
     }
 }
+
+/// Clear bodies, where there are any, of methods whose paths go through them.
+pub fn clear_bodies(scene: &Scene) -> Option<Part> {
+    let what = "paths are mirrored at them and refracted through them; lights behind them are met by chance";
+    scene.has_clear_bodies().then(|| Part::built("clear bodies", what))
+}

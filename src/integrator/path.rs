@@ -1,6 +1,7 @@
-//! Path tracing over opaque surfaces: light from lamps and environment by any number of reflections.
+//! Path tracing over opaque surfaces and through clear bodies: light from lamps and environment by any number of reflections.
 
 use super::direct::lambertian_albedos;
+use super::parts::clear_bodies;
 use super::shade::DirectLight;
 use super::volume_path::{Scratch, VolumePath};
 use super::{CameraRay, Integrator, KnownLights, MOST_SURFACES, Part, View, camera_hits};
@@ -21,6 +22,11 @@ pub struct Path {
 }
 
 impl Path {
+    /// What to say of `scene` before it is rendered: light that may not be found.
+    pub fn warnings(&self, scene: &Scene) -> Vec<String> {
+        self.paths.warnings(scene)
+    }
+
     /// Over at most `bounces` surfaces after the first; as many as it takes if absent.
     ///
     /// # Errors
@@ -43,8 +49,10 @@ impl Integrator for Path {
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = camera_hits(view, rays, tally);
         let mut scratch = Scratch::default();
+        let inside = self.paths.camera_is_inside();
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
             *out = match hit {
+                _ if inside => self.paths.seen_from_inside(view, ray, &mut scratch, tally),
                 None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) => self.paths.seen(view, ray, hit, &mut scratch, tally),
             };
@@ -62,6 +70,7 @@ impl Integrator for Path {
             None => "over as many surfaces as it takes, by Russian roulette".into(),
         };
         parts.push(Part::built("paths", over));
+        parts.extend(clear_bodies(scene));
         let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
         let why = if translucent {
             "`path` shows translucent surfaces as Lambertian ones of the same reflectance"

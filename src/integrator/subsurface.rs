@@ -2,7 +2,7 @@
 
 use super::direct::lambertian_albedos;
 use super::indirect::{Indirect, OVER};
-use super::parts::of_cache;
+use super::parts::{clear_bodies, of_cache};
 use super::shade::DirectLight;
 use super::single::Single;
 use super::volume_path::{Asked, Modelled, Scratch as PathScratch};
@@ -72,7 +72,12 @@ impl Subsurface {
 
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        self.indirect.as_ref().map_or(Vec::new(), |indirect| indirect.paths.warnings(scene))
+        if let Some(indirect) = &self.indirect {
+            return indirect.paths.warnings(scene);
+        }
+        let black = "`subsurface` without light over other surfaces (`bounces = 0`, `--as-notes`) shows clear bodies black, and lets no \
+                     light through; leave that out, or take --method volume_path";
+        if scene.has_clear_bodies() { vec![black.into()] } else { Vec::new() }
     }
 
     /// Number of bodies with a near field.
@@ -126,8 +131,10 @@ impl Subsurface {
         tally: &mut Tally,
     ) {
         let (mut paths, mut asked) = (PathScratch::default(), Vec::new());
+        let inside = indirect.paths.camera_is_inside();
         for (i, (ray, hit)) in rays.iter().zip(hits).enumerate() {
             out[i] = match hit {
+                _ if inside => indirect.paths.seen_from_inside(view, ray, &mut paths, tally),
                 None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) if view.scene.surface(hit.mesh).is_opaque() => {
                     let (at, albedo) = (view.point(hit, ray.ray.direction), self.albedo[hit.mesh as usize]);
@@ -228,6 +235,9 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
         let surface = &scene.materials[o.material].surface;
         modelled[*i].is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
     };
+    if scene.has_clear_bodies() {
+        return true;
+    }
     let mut all = scene.objects.iter().enumerate().filter(reflects);
     match (all.next(), all.next()) {
         (None, _) => false,
@@ -310,6 +320,7 @@ impl Integrator for Subsurface {
         for (object, plan) in scene.objects.iter().zip(&self.plans) {
             parts.extend(plan.iter().flat_map(|plan| of_cache(plan, &object.name, self.options.estimator)));
         }
+        parts.extend(self.indirect.as_ref().and_then(|_| clear_bodies(scene)));
         parts.push(match &self.indirect {
             Some(indirect) => indirect.part(),
             None if self.options.bounces == 0 => {

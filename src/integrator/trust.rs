@@ -132,7 +132,9 @@ impl Trustworthiness {
         let closed: Vec<Local> = locals.iter().copied().filter(|l| !l.thickness.is_nan()).collect();
         let open = 1.0 - closed.len() as f64 / locals.len() as f64;
         let own = shape.own();
-        let mut candidates: Vec<Candidate> = CANDIDATES.into_iter().chain(as_slab(&closed, locals.len())).collect();
+        // A sheet is a slab by what it was made as, whatever its facets are.
+        let slab = object.sheet.map(|thickness| slab(thickness as f32)).or_else(|| as_slab(&closed, locals.len()));
+        let mut candidates: Vec<Candidate> = CANDIDATES.into_iter().chain(slab).collect();
         candidates.retain(|c| !c.is_kind_of(own) && exists(material, *c));
         candidates.push(own);
         let mut models: Vec<(Candidate, ModelOnBody)> = candidates
@@ -213,7 +215,11 @@ fn as_slab(closed: &[Local], all: usize) -> Option<Candidate> {
     let middle = *sorted.get(sorted.len() / 2)?;
     let flat = |l: &&Local| (l.thickness - middle).abs() < 0.05 * middle && l.curvature.abs() * middle < 0.2;
     let share = closed.iter().filter(flat).count() as f64 / all as f64;
-    (share > NEARLY_ALL).then_some(Candidate { model: ModelName::SLAB, calibrated: false, thickness: Some(middle) })
+    (share > NEARLY_ALL).then_some(slab(middle))
+}
+
+fn slab(thickness: f32) -> Candidate {
+    Candidate { model: ModelName::SLAB, calibrated: false, thickness: Some(thickness) }
 }
 
 /// Whether the program makes this model of the material.

@@ -174,6 +174,7 @@ impl Prepared {
         let warnings = match &method {
             Method::VolumePath(paths) => paths.warnings(&scene),
             Method::Subsurface(subsurface) => subsurface.warnings(&scene),
+            Method::Path(path) => path.warnings(&scene),
             _ => Vec::new(),
         };
         scene.warnings.extend(warnings);

@@ -31,7 +31,7 @@ impl Object {
 pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>) -> Vec<String> {
     let Ok(model) = t.build() else { return Vec::new() };
     let shape = Shape::of(object);
-    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &*model, shape, untraceable));
+    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &*model, (shape, object.sheet.is_some()), untraceable));
     // A thin body is the larger error, and has one remedy.
     let nature = if sheet.is_none() { by_nature(t, &*model, untraceable) } else { None };
     sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &*model, &shape, untraceable))).collect()
@@ -59,7 +59,7 @@ impl Shape {
         let (sheet, curvature) = (2.0 * volume / area, bend / area);
         // Convex bodies have at most 2/3 [Minkowski].
         let round = (sheet * curvature).clamp(0.0, 2.0 / 3.0);
-        let thickness = (sheet / (1.0 - round)).min(shortest);
+        let thickness = object.sheet.unwrap_or((sheet / (1.0 - round)).min(shortest));
         thickness.is_finite().then_some(Self { thickness, curvature: round / sheet })
     }
 }
@@ -83,7 +83,12 @@ fn remedy(other: Option<String>, untraceable: &Untraceable<'_>) -> String {
 }
 
 /// A model of a half space lets light out through both faces of a sheet as if each were the only one.
-fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Untraceable<'_>) -> Option<String> {
+fn too_thin(
+    t: &Translucent,
+    model: &dyn Bssrdf,
+    (shape, is_sheet): (&Shape, bool),
+    untraceable: &Untraceable<'_>,
+) -> Option<String> {
     if model.name().takes(ModelOption::Thickness) {
         return None;
     }
@@ -108,8 +113,11 @@ fn too_thin(t: &Translucent, model: &dyn Bssrdf, shape: &Shape, untraceable: &Un
     // Worse than the same medium in a body without end.
     let brighter = largest(&t.medium, each().filter(|(_, k)| factor(k) > plane(k)).map(|(c, k)| (c, factor(k))));
     if let Some((channel, factor)) = brighter.filter(|(_, factor)| *factor > 1.0 + EXCESS) {
-        let slab = (thickness > SLAB_FROM * path)
-            .then(|| format!("take model `slab` with thickness = {} if it is flat", short(thickness)));
+        let words = |is_sheet| match is_sheet {
+            true => "take model `slab`".to_string(),
+            false => format!("take model `slab` with thickness = {} if it is flat", short(thickness)),
+        };
+        let slab = (thickness > SLAB_FROM * path).then(|| words(is_sheet));
         let measured = each().all(|(_, k)| place(k) == place(k).nearest_measured());
         let (about, like) = if measured {
             ("up to", "")
@@ -200,7 +208,16 @@ mod tests {
     fn object(mesh: &crate::geometry::ObjMesh) -> Object {
         let mesh = mesh.recentred(DVec3::ZERO);
         let findings = examine(&mesh);
-        Object { name: String::new(), mesh, at: String::new(), material: 0, flipped: false, findings, priority: 0 }
+        Object {
+            name: String::new(),
+            mesh,
+            at: String::new(),
+            material: 0,
+            flipped: false,
+            findings,
+            priority: 0,
+            sheet: None,
+        }
     }
 
     /// Six rectangles, their corners at the same places.

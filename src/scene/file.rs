@@ -167,8 +167,21 @@ impl SceneFile {
             materials,
             root: root.clone(),
         };
+        refuse_unknown_thickness(&file)?;
         Ok(file)
     }
+}
+
+/// Refuses a material whose model needs a thickness that neither it has nor each of its objects.
+fn refuse_unknown_thickness(file: &SceneFile) -> Result<()> {
+    for (number, material) in file.materials.iter().enumerate() {
+        let Some(what) = &material.without_thickness else { continue };
+        let mut objects = file.objects.iter().filter(|o| o.material == number).peekable();
+        if objects.peek().is_none() || objects.any(|o| o.thickness.is_none()) {
+            return Err(Error::scene(what.clone()));
+        }
+    }
+    Ok(())
 }
 
 fn camera(top: &Fields<'_>) -> Result<CameraEntry> {

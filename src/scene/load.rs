@@ -8,7 +8,7 @@ use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
 use super::values::unit_vector;
 use super::{
-    Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
+    Camera, Insides, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, sheets, warnings,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
@@ -38,12 +38,13 @@ impl Scene {
         let folder = file.path.parent().unwrap_or(Path::new(""));
         let environment = file.environment.load(folder, &mut said)?;
         let placed = meshes(file, folder, repair, &mut said)?;
+        let (materials, of_objects) = sheets::materials(file, &mut said)?;
         let translucent = |entry: &ObjectEntry| file.materials[entry.material].surface.is_translucent();
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
         let mut objects = Vec::with_capacity(placed.len());
-        for (entry, mesh) in file.objects.iter().zip(placed) {
+        for ((entry, mesh), material) in file.objects.iter().zip(placed).zip(of_objects) {
             let alone = if entry.normals == NormalsChoice::Smooth { mesh.sharing_no_corner() } else { 0 };
             let as_placed = mesh;
             let mesh = as_placed.recentred(centre);
@@ -55,8 +56,8 @@ impl Scene {
             let findings = examine(&mesh);
             said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
             let (name, at) = (entry.name.clone(), entry.at.clone());
-            let (material, priority) = (entry.material, entry.priority);
-            objects.push(Object { name, mesh, at, material, flipped: entry.flip, findings, priority });
+            let (flipped, priority, thickness) = (entry.flip, entry.priority, entry.thickness);
+            objects.push(Object { name, mesh, at, material, flipped, findings, priority, sheet: thickness });
         }
         let mut scene = Self {
             name: file.path.display().to_string(),
@@ -64,7 +65,7 @@ impl Scene {
             centre,
             camera: camera(file, centre)?,
             objects,
-            materials: materials(file),
+            materials,
             environment,
             why_double: None,
             warnings: Vec::new(),
@@ -78,10 +79,14 @@ impl Scene {
             scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
         }
         scene.why_double = choice.why_double;
+        for (entry, object) in file.objects.iter().zip(&scene.objects) {
+            sheets::refuse_folds(entry, object, centre)?;
+        }
         // From here on: the gap between two surfaces depends on what rays are traced in.
         said.extend(warnings::of(file, &scene));
         let method = file.method.name.unwrap_or_else(|| scene.default_method());
-        let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath);
+        let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath)
+            || method == MethodName::Path && scene.has_clear_bodies();
         for (number, what) in choice.beyond {
             let entry = &file.objects[number];
             // What encloses nothing is not too thin besides, where that is said.
@@ -160,7 +165,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                 mesh.unwrap_or_default()
             }
         };
-        out.push(place(entry, mesh, repair, said));
+        out.push(sheets::body(entry, place(entry, mesh, repair, said), said)?);
     }
     Ok(out)
 }
@@ -248,15 +253,4 @@ fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {
                 file.path.display()
             ))
         })
-}
-
-fn materials(file: &SceneFile) -> Vec<Material> {
-    let made = file.materials.iter().map(|m| {
-        let mut surface = m.surface.clone();
-        if let (Some(t), Some(model)) = (&mut surface.inside, file.method.model) {
-            t.model = model;
-        }
-        Material { name: m.name.clone(), surface }
-    });
-    made.collect()
 }

@@ -17,6 +17,8 @@ pub struct MaterialEntry {
     pub surface: Surface,
     /// File and line, for messages.
     pub at: String,
+    /// What is wrong with it unless each of its objects has a `thickness`.
+    pub(super) without_thickness: Option<String>,
 }
 
 const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "emissive"];
@@ -30,8 +32,9 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
     let entries = table.tables().map(|entry| {
         let (name, m) = entry?;
         let kind = m.need("type", "\"translucent\", \"dielectric\", \"diffuse\" or \"emissive\"", Node::text)?;
+        let mut without_thickness = None;
         let surface = match kind {
-            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0))?,
+            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), &mut without_thickness)?,
             "diffuse" => {
                 m.only("a diffuse material", &["type", "albedo"])?;
                 let expected = "one number or three from 0 to 1";
@@ -51,7 +54,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),
         };
-        Ok(MaterialEntry { name: name.to_string(), surface, at: m.at() })
+        Ok(MaterialEntry { name: name.to_string(), surface, at: m.at(), without_thickness })
     });
     entries.collect()
 }
@@ -72,7 +75,7 @@ fn refractive_index(n: &Node) -> Option<f64> {
     n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0)
 }
 
-fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
+fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<String>) -> Result<Surface> {
     let keys = [
         "type",
         "preset",
@@ -112,7 +115,12 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64) -> Result<Surface> {
         exit_normalisation: switch(m, "exit_normalisation")?.unwrap_or(true),
         source,
     };
-    translucent.build().map_err(|e| m.error(e.to_string()))?;
+    match translucent.build().map_err(|e| m.error(e)) {
+        Err(e) if translucent.model == ModelName::SLAB && translucent.thickness.is_none() => {
+            *without_thickness = Some(format!("{e}, or a `thickness` of each open mesh that it is the material of"));
+        }
+        built => drop(built?),
+    }
     Ok(Surface::translucent(translucent))
 }
 

@@ -17,6 +17,7 @@ mod obstacle;
 mod obstacles;
 mod options;
 mod precision;
+mod sheets;
 mod tree;
 mod untraceable;
 mod values;

@@ -26,6 +26,8 @@ pub struct ObjectEntry {
     pub flip: bool,
     /// Where bodies overlap, the one of the higher priority is there.
     pub priority: i32,
+    /// Its mesh is the middle of a sheet so thick \[unit\], > 0.
+    pub thickness: Option<f64>,
     /// From its own space into the scene's [unit]; has an inverse.
     pub transform: DAffine3,
     /// File and line, for messages.
@@ -71,7 +73,8 @@ named! {
     Smooth = "smooth"
 }
 
-const COMMON: [&str; 8] = ["name", "mesh", "shape", "material", "normals", "flip", "priority", "transform"];
+const COMMON: [&str; 9] =
+    ["name", "mesh", "shape", "material", "normals", "flip", "priority", "thickness", "transform"];
 
 const PRIORITY: &str = "a whole number; the higher one wins where bodies overlap";
 
@@ -100,6 +103,10 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
             };
             o.error_at("material", what)
         })?;
+        let thickness = o.get("thickness", "a number of units above 0", length)?;
+        if thickness.is_some() && !materials[material].surface.is_translucent() {
+            return Err(o.error_at("thickness", no_inside(&name, asked)));
+        }
         out.push(ObjectEntry {
             name,
             geometry,
@@ -107,11 +114,24 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
             normals: named_value(o, "normals")?.unwrap_or(NormalsChoice::Auto),
             flip: switch(o, "flip")?.unwrap_or(false),
             priority: o.get("priority", PRIORITY, |n| n.integer().and_then(|i| i32::try_from(i).ok()))?.unwrap_or(0),
+            thickness,
             transform: transform(o)?,
             at: o.at(),
         });
     }
     Ok(out)
+}
+
+/// A length that f32 holds as well.
+fn length(n: &Node) -> Option<f64> {
+    n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0)
+}
+
+fn no_inside(object: &str, material: &str) -> String {
+    format!(
+        "is that of a sheet of a translucent medium, and {object:?} is of {material:?}, which is none; leave it out, or give the \
+         object a material of type \"translucent\""
+    )
 }
 
 fn geometry(o: &Fields<'_>) -> Result<Geometry> {

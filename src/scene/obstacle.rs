@@ -59,6 +59,9 @@ pub struct Obstacle {
     pub remedy: String,
     /// Whether a remark on the mesh says it already.
     pub(super) said: bool,
+    /// Whether no medium of it scatters.
+    #[serde(skip)]
+    pub(super) clear: bool,
 }
 
 impl Obstacle {
@@ -85,6 +88,17 @@ impl Obstacle {
         use ObstacleKind::*;
         let effect = match (method, self.kind) {
             (MethodName::AmbientOcclusion | MethodName::Direct, _) => return None,
+            (MethodName::Path, _) if !self.clear => return None,
+            (MethodName::Path | MethodName::Subsurface, _) if self.clear => match self.kind {
+                Unwelded | Sheet | Uncounted | Faces | Walls | Turned => "light that enters it is lost, and counted",
+                Holes | Blemish => "paths that come there are lost, and counted",
+                Hidden => "nothing of it is seen",
+                OpaqueTouching => "light may pass there from one side to the other",
+                Unknown => "what is inside is not known there",
+                LampTouching => "whether its light enters there is left to rounding",
+                CameraTouching => "whether it is inside is left to rounding",
+                Crossing | Nested | Touching | LampInside | CameraInside => return None,
+            },
             (_, OpaqueTouching) => "light may pass there from one side to the other",
             (_, Unknown) => "what is inside is not known there",
             _ if self.said => return None,

@@ -6,6 +6,7 @@ use super::{Object, Obstacle, ObstacleKind, Scene};
 use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, lying, meeting, mended};
 use crate::math::{Aabb, DVec3};
 use crate::words::{self, counted, either, percent};
+use std::collections::HashSet;
 
 /// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
 const OFFSETS: f64 = 2.0;
@@ -125,6 +126,12 @@ impl Found {
                 found.join(body, body);
             }
         }
+        let scatters = scene.objects.iter().filter(|o| scene.materials[o.material].surface.is_translucent());
+        let scatters: HashSet<&str> = scatters.map(|o| o.name.as_str()).collect();
+        found
+            .obstacles
+            .iter_mut()
+            .for_each(|o| o.clear = !o.objects.iter().any(|name| scatters.contains(name.as_str())));
         found
     }
 
@@ -154,6 +161,7 @@ impl Found {
             what,
             remedy,
             said: false,
+            clear: false,
         };
         let name = &body.object.name;
         if body.solid.is_near(camera, gap) {
@@ -213,6 +221,7 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
                 _ => false,
             },
             what: format!("object {name:?}: {what}"),
+            clear: false,
             remedy: if remedy == TURN && body.object.flipped { TURN_BACK.into() } else { remedy.into() },
         });
     };
@@ -264,7 +273,11 @@ fn seams(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &st
             "an open sheet has no inside ({} to one triangle alone; the openings are {share} of its surface)",
             counted(edges, "edge belongs", "edges belong")
         );
-        say(ObstacleKind::Sheet, what, "give it a thickness, as a closed mesh, or close the openings of a solid body");
+        say(
+            ObstacleKind::Sheet,
+            what,
+            "give it a thickness (the key of the object), or close the openings of a solid body",
+        );
     } else if edges > 0 {
         let what = counted(edges, "edge is the rim of a hole", "edges are rims of holes");
         say(ObstacleKind::Holes, format!("{what}, {share} of its surface"), "close them");
@@ -382,7 +395,7 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
     let (one, other) = (&a.object.name, &b.object.name);
     let obstacle = |kind, what: String, remedy: String| {
         let (objects, at) = (vec![one.clone(), other.clone()], b.object.at.clone());
-        Some(Obstacle { kind, objects, at, what, remedy, said: false })
+        Some(Obstacle { kind, objects, at, what, remedy, said: false, clear: false })
     };
     let seek = if b.kind == Role::Opaque { Seek::Touching } else { Seek::Crossing };
     let found = meeting(&a.solid, &b.solid, gap, seek, |_| true);

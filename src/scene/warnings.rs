@@ -24,7 +24,7 @@ pub(super) fn of(file: &SceneFile, scene: &Scene) -> Vec<String> {
 
 fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
     let mut used = vec![false; file.materials.len()];
-    scene.objects.iter().for_each(|o| used[o.material] = true);
+    file.objects.iter().for_each(|o| used[o.material] = true);
     for (i, entry) in file.materials.iter().enumerate() {
         let head = format!("{}: material {:?}", entry.at, entry.name);
         if !used[i] {
@@ -44,8 +44,11 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
 /// What the method makes of a clear body.
 fn clear(file: &SceneFile, scene: &Scene) -> Option<String> {
     let method = file.method.name.unwrap_or_else(|| scene.default_method());
-    matches!(method, MethodName::Subsurface | MethodName::Direct)
-        .then(|| format!("`{}` shows it black and lets no light through; take --method volume_path", method.name()))
+    (method == MethodName::Direct).then(|| {
+        "`direct` shows it black and lets no light through, for it has light straight from lights alone; take --method path, or \
+         --method volume_path"
+            .into()
+    })
 }
 
 /// Whether a BSSRDF is what decides of a translucent material.

@@ -50,6 +50,8 @@ pub struct Object {
     pub findings: Findings,
     /// Where bodies overlap, the one of the higher priority is there.
     pub priority: i32,
+    /// Thickness of the sheet that was made of an open mesh \[unit\]; `None` where the mesh is as in the file.
+    pub sheet: Option<f64>,
 }
 
 /// A surface by name.
@@ -70,7 +72,7 @@ pub struct Surface {
     pub emission: Option<Emission>,
     /// The scattering medium where the outward normal does not point; of a translucent body.
     pub inside: Option<Translucent>,
-    /// What is there of a clear body, which `volume_path` alone shows.
+    /// What is there of a clear body.
     pub clear: Option<Dielectric>,
 }
 
@@ -162,6 +164,11 @@ impl Scene {
     /// Whether an obstacle of this kind concerns one of [`Self::objects`].
     pub fn has(&self, object: &Object, kind: ObstacleKind) -> bool {
         self.obstacles().iter().any(|o| o.kind == kind && o.objects.contains(&object.name))
+    }
+
+    /// Whether any of its bodies is clear: refracts and absorbs, but does not scatter.
+    pub fn has_clear_bodies(&self) -> bool {
+        self.objects.iter().any(|o| self.materials[o.material].surface.clear.is_some())
     }
 
     /// Whether nothing sends out light: no emissive object, no environment.

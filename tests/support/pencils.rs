@@ -101,6 +101,7 @@ impl Body {
                 flipped: false,
                 findings: Findings::default(),
                 priority: 0,
+                sheet: None,
             }],
             materials: vec![Material { name: "body".into(), surface: Surface::translucent(translucent) }],
             environment: Rgb::BLACK.into(),

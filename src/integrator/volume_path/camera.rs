@@ -5,7 +5,7 @@ use super::body::{Body, Edge, MOST_SURFACES, Straight, Watch, survives};
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
-use super::nesting::{self, Entry, Guide};
+use super::nesting::{self, Entry, Guide, Meets};
 use super::spectrum::Spectrum;
 use super::through::{drawn_light, share_by_chance, sun_share_by_chance};
 use crate::geometry::SurfacePoint;
@@ -319,6 +319,10 @@ struct Nested<'a, 'b>(&'a mut CameraPath<'b>);
 impl Guide for Nested<'_, '_> {
     fn watch<'a>(&'a mut self, body: &'a Body, lit: bool) -> impl Watch + 'a {
         Gather { path: self.0, body, lit }
+    }
+
+    fn meets(&self, object: u32) -> Meets {
+        self.0.method.meets(object)
     }
 }
 

@@ -18,7 +18,8 @@ const SUNNY: f32 = 0.01;
 const MOST_NAMES: usize = 8;
 
 /// What is to say of a scene before it is rendered; `None` where there is no such light.
-pub fn warning(scene: &Scene, lights: &Lights) -> Option<String> {
+/// `passes` tells of which objects paths go through the body.
+pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -> Option<String> {
     let (mut kept, mut known) = ([Vec::new(), Vec::new()], [HashSet::new(), HashSet::new()]);
     let mut keep = |list: usize, name: &str| {
         let name = format!("{name:?}");
@@ -30,7 +31,7 @@ pub fn warning(scene: &Scene, lights: &Lights) -> Option<String> {
         && f64::from(lights.solid_angle_of_suns()) < SMALL * PI
         && lights.share_beside_suns() < 1.0 - SUNNY;
     for (i, body) in scene.objects.iter().enumerate() {
-        let Some(medium) = scene.materials[body.material].surface.medium() else { continue };
+        let Some(medium) = scene.materials[body.material].surface.medium().filter(|_| passes(i)) else { continue };
         if !is_clear(&medium, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
             continue;
         }

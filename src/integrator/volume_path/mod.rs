@@ -12,6 +12,7 @@ mod connect;
 mod draws;
 mod emission;
 mod facets;
+mod glass;
 mod modelled;
 #[cfg(test)]
 mod near_checks;
@@ -169,7 +170,9 @@ impl VolumePath {
 
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
-        clear::warning(scene, &self.light.lights).into_iter().collect()
+        // Behind a stand-in is nothing.
+        let passes = |object: usize| self.stand_ins[object].is_none();
+        clear::warning(scene, &self.light.lights, passes).into_iter().collect()
     }
 
     fn shade(

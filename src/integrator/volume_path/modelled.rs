@@ -4,6 +4,7 @@ use super::body::{Body, Edge, MOST_SURFACES, Watch, survives};
 use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
 use super::draws::Draws;
+use super::glass;
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
 use super::{Asked, VolumePath, VolumePathOptions, endless_bodies, throughs};
@@ -68,20 +69,23 @@ impl VolumePath {
     ) -> Self {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, ..options };
         let surfaces = Self::surfaces(scene, options);
-        let bodies = endless_bodies(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
+        let walked = endless_bodies(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
+        let clear = glass::clear_bodies(scene);
+        let bodies: Vec<Option<Body>> = walked.into_iter().zip(clear).map(|(body, clear)| clear.or(body)).collect();
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
-        Self { throughs, bodies, modelled, bounces, ..surfaces }
+        Self { throughs, bodies, modelled, bounces, camera_in: glass::camera_in(scene), ..surfaces }
     }
 
-    /// Paths over opaque surfaces, for which `stand_ins` are those of bodies; without them paths end there.
+    /// Paths over opaque surfaces and through clear bodies; `stand_ins` are the surfaces of bodies that scatter, without them paths end there.
     pub(in super::super) fn over_surfaces(
         scene: &Scene,
         stand_ins: Vec<Option<Lambertian>>,
         bounces: u32,
         seed: u64,
     ) -> Self {
-        let options = VolumePathOptions { photons: 0, specular: false, seed, ..VolumePathOptions::default() };
-        Self { stand_ins, bounces, ..Self::surfaces(scene, options) }
+        let options = VolumePathOptions { photons: 0, specular: true, seed, ..VolumePathOptions::default() };
+        let (bodies, camera_in) = (glass::clear_bodies(scene), glass::camera_in(scene));
+        Self { stand_ins, bounces, bodies, camera_in, ..Self::surfaces(scene, options) }
     }
 
     /// Radiance along the ray of the camera but for what is asked of models, which is added to `scratch`.
@@ -120,7 +124,7 @@ impl VolumePath {
         path.radiance
     }
 
-    /// Radiance that a path finds which comes along `direction` to the opaque surface at `hit`, but for what shines there.
+    /// Radiance that a path finds which comes along `direction` to the opaque surface or clear body at `hit`, but for what shines there.
     pub(in super::super) fn arriving(
         &self,
         view: View<'_>,

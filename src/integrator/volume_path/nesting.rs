@@ -13,10 +13,10 @@ use super::draws::Draws;
 use super::spectrum::Spectrum;
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::sampling::cosine_hemisphere;
-use crate::scene::{Nests, Surface};
+use crate::scene::Nests;
 use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
 
@@ -162,6 +162,19 @@ impl<'a> Entry<'a> {
 pub trait Guide {
     /// For `body`.
     fn watch<'a>(&'a mut self, body: &'a Body, lit: bool) -> impl Watch + 'a;
+
+    /// How paths meet the body of object number `object`.
+    fn meets(&self, object: u32) -> Meets;
+}
+
+/// How paths in bodies meet another body.
+pub enum Meets {
+    /// They enter it.
+    Enters,
+    /// As an opaque surface of this albedo.
+    Matt(Rgb),
+    /// They end, and are counted.
+    Ends,
 }
 
 /// The bodies around a path, and the object and triangle that it has just left.
@@ -255,14 +268,15 @@ pub fn walk<'a>(
             ahead = Some((distance - hit.t).max(0.0));
             continue;
         }
-        let met = match view.scene.surface(hit.mesh) {
-            Surface { emission: Some(_), .. } => {
+        let surface = view.scene.surface(hit.mesh);
+        let met = match if surface.is_body() { guide.meets(hit.mesh) } else { Meets::Matt(surface.bsdf.albedo()) } {
+            Meets::Matt(_) if surface.emission.is_some() => {
                 guide.watch(body, false).lamp(&hit, w, spectrum);
                 return None;
             }
-            surface if surface.is_opaque() => {
+            Meets::Matt(albedo) => {
                 let (at, before) = (at.facing(-w), spectrum.value(&body.medium).max());
-                spectrum.scale(surface.bsdf.albedo());
+                spectrum.scale(albedo);
                 let left = spectrum.value(&body.medium).max();
                 if left <= 0.0 || !survives(left / before, spectrum, draws) {
                     return None;
@@ -271,7 +285,11 @@ pub fn walk<'a>(
                 (from, phase) = (at.leave(w), None);
                 continue;
             }
-            _ => bodies[hit.mesh as usize].as_ref().map(|other| faces(view, &stack, other, &hit, &at, w)),
+            Meets::Ends => {
+                tally.losses.add(body.object, Cause::OtherMedium);
+                return None;
+            }
+            Meets::Enters => bodies[hit.mesh as usize].as_ref().map(|other| faces(view, &stack, other, &hit, &at, w)),
         };
         let beyond = met.and_then(|faces| Some((stack.crossed(&faces.turns, nests)?, faces)));
         let Some((after, faces)) = beyond else {
