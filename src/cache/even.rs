@@ -27,7 +27,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let body = &plan.body;
     let samples = plan.samples.clamp(SAMPLES[0], SAMPLES[1]);
     let count = samples / SAMPLES_PER_POINT;
-    let surface = view.scene.surface(body.object).inside.as_ref()?;
+    let surface = view.scene.surface(body.object()).inside.as_ref()?;
     if body.model.name() == ModelName::SLAB || plan.near.is_some() {
         return None;
     }
@@ -38,21 +38,21 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
     let on_a_plane = own.map(|total| (f64::from(total) / (PI * exit)) as f32);
-    let mesh = &view.scene.objects[body.object as usize].mesh;
+    let mesh = &view.scene.objects[body.object() as usize].mesh;
     let flat = |(pick, u): (f64, [f32; 7])| {
-        let at = body.table.sample(pick, [u[0], u[1]]);
+        let at = body.table().sample(pick, [u[0], u[1]]);
         let at = mesh.point(at.triangle, at.u, at.v);
         SurfacePoint { n: at.n_geometric, ..at }
     };
-    let [light, points] = [1, 2].map(|k| CacheStream::new(Points::Sobol, seed, k << 32 | u64::from(body.object)));
+    let [light, points] = [1, 2].map(|k| CacheStream::new(Points::Sobol, seed, k << 32 | u64::from(body.object())));
     let enter = |i: u64| {
         let numbers = light.numbers(i);
         let at = flat(numbers);
         let w = cosine_hemisphere(at.n, [numbers.1[2], numbers.1[3]]);
-        body.enters(&at, w, (Rgb::WHITE, body.table.area() as f32), numbers.1[4])
+        body.enters(&at, w, (Rgb::WHITE, body.table().area() as f32), numbers.1[4])
     };
     let lit: Vec<CachedSample> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
-    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / body.table.area();
+    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / body.table().area();
     let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition: Partition::NONE };
     let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: samples }, &*body.model, tuning);
     let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(count)).map(|i| points.numbers(i)).collect();
@@ -63,7 +63,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
         .map(|(chunk, picks)| {
             let point = |(i, &numbers): (usize, &(f64, [f32; 7]))| {
                 let at = flat(numbers);
-                let exit = Exit { x: (at.x - body.table.centre()).as_vec3(), n: at.n, w: at.n };
+                let exit = Exit { x: (at.x - body.table().centre()).as_vec3(), n: at.n, w: at.n };
                 GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) }
             };
             let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
@@ -81,5 +81,5 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, divisor: divisor(sum) }).collect()
         })
         .collect();
-    Some(Balance::new(known.into_iter().flatten().collect(), body.table.area(), body.table.centre()))
+    Some(Balance::new(known.into_iter().flatten().collect(), body.table().area(), body.table().centre()))
 }

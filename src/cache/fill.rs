@@ -8,17 +8,16 @@ use crate::math::{Rgb, Vec3};
 use crate::optics::{refract, transmittance};
 use crate::query::Ray;
 use crate::sampling::CacheStream;
-use crate::scene::View;
+use crate::scene::{Body, Scene, View};
 use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::sync::Arc;
 
-/// A translucent object as light enters it.
+/// A body as light enters it, by its model.
 pub struct Receiver {
-    /// Its number.
-    pub object: u32,
-    /// Its area table; cached points are relative to its centre.
-    pub table: AreaTable,
+    /// The body itself.
+    pub body: Arc<Body>,
     /// Its BSSRDF, which says at what depth a sample stands.
     pub model: Box<dyn Bssrdf>,
     /// Its relative index of refraction.
@@ -26,13 +25,29 @@ pub struct Receiver {
 }
 
 impl Receiver {
+    /// Of object number `object` by `model`; `None` where that bounds no body.
+    pub fn new(scene: &Scene, object: u32, model: Box<dyn Bssrdf>) -> Option<Self> {
+        let body = scene.body(object)?.clone();
+        Some(Self { eta: body.medium.eta, body, model })
+    }
+
+    /// Index of its surface.
+    pub fn object(&self) -> u32 {
+        self.body.object
+    }
+
+    /// Its area table; cached points are relative to its centre.
+    pub fn table(&self) -> &AreaTable {
+        &self.body.table
+    }
+
     /// Light as it enters at `at`, flat as the triangle it lies on, seen from there in the unit direction `w`: `irradiance` times
     /// `weight` [unit²] before the boundary, `u` in [0, 1) for the depth. `None` where it is totally reflected.
     pub fn enters(&self, at: &SurfacePoint, w: Vec3, (irradiance, weight): (Rgb, f32), u: f32) -> Option<CachedSample> {
         let refracted = refract(w, at.n, self.eta)?;
         let flux = irradiance * (transmittance(self.eta, w.dot(at.n)) * weight);
         (!flux.is_black()).then(|| CachedSample {
-            entry: Entry { x: (at.x - self.table.centre()).as_vec3(), n: at.n, w: refracted },
+            entry: Entry { x: (at.x - self.table().centre()).as_vec3(), n: at.n, w: refracted },
             depth: self.model.sample_depth(u),
             flux,
         })
@@ -208,10 +223,10 @@ impl Filler<'_> {
     pub fn point(&self, number: u64) -> (SurfacePoint, f32, [f32; 5]) {
         let (pick, u) = self.stream.numbers(number);
         let (pick, weight) = self.density.place(pick);
-        let at = self.body.table.sample(pick, [u[0], u[1]]);
-        let mut point = self.view.scene.objects[self.body.object as usize].mesh.point(at.triangle, at.u, at.v);
+        let at = self.body.table().sample(pick, [u[0], u[1]]);
+        let mut point = self.view.scene.objects[self.body.object() as usize].mesh.point(at.triangle, at.u, at.v);
         // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
         point.n = point.n_geometric;
-        (point, weight * self.body.table.area() as f32, [u[2], u[3], u[4], u[5], u[6]])
+        (point, weight * self.body.table().area() as f32, [u[2], u[3], u[4], u[5], u[6]])
     }
 }

@@ -238,7 +238,7 @@ impl NearField {
                 let square = f64::from(self.radius) * f64::from(self.radius);
                 let near = |place: &DVec3| place.distance_squared(line.middle) <= square;
                 if !again
-                    && hit.mesh == filler.body.object
+                    && hit.mesh == filler.body.object()
                     && let Some(place) = crossing().filter(near)
                 {
                     let at = view.outwards(hit);

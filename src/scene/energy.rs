@@ -19,18 +19,9 @@ const SLAB_FROM: f64 = 2.0;
 /// Why `volume_path` is no remedy for the object; see [`super::Scene::untraceable`].
 type Untraceable<'a> = dyn Fn() -> Option<String> + 'a;
 
-impl Object {
-    /// Way through it along the normal [unit], as of the sheet, rod or ball that it is most like; `None` for a mesh that
-    /// encloses nothing.
-    pub fn thickness(&self) -> Option<f64> {
-        Shape::of(self).map(|shape| shape.thickness)
-    }
-}
-
 /// What is to say of the energy of an object's model; nothing where it is as good as on a plane.
-pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>) -> Vec<String> {
+pub(super) fn of(t: &Translucent, shape: Option<Shape>, untraceable: &Untraceable<'_>) -> Vec<String> {
     let Ok(model) = t.build() else { return Vec::new() };
-    let shape = Shape::of(object);
     let sheet = shape.as_ref().and_then(|shape| too_thin(t, &*model, shape, untraceable));
     // A thin body is the larger error, and has one remedy.
     let nature = if sheet.is_none() { by_nature(t, &*model, untraceable) } else { None };
@@ -200,7 +191,16 @@ mod tests {
     fn object(mesh: &crate::geometry::ObjMesh) -> Object {
         let mesh = mesh.recentred(DVec3::ZERO);
         let findings = examine(&mesh);
-        Object { name: String::new(), mesh, at: String::new(), material: 0, flipped: false, findings, priority: 0 }
+        Object {
+            name: String::new(),
+            parts: Vec::new(),
+            mesh,
+            at: String::new(),
+            material: 0,
+            flipped: false,
+            findings,
+            priority: 0,
+        }
     }
 
     /// Six rectangles, their corners at the same places.
@@ -249,17 +249,18 @@ mod tests {
         };
         let (thick, thin) = (cuboid([50.0, 20.0, 50.0]), cuboid([50.0, 0.2, 50.0]));
         for model in [ModelName::STANDARD, ModelName::BETTER, ModelName::BEAM, ModelName::NORMALISED, ModelName::AUTO] {
-            assert_eq!(super::of(&of(model), &thick, &|| None), Vec::<String>::new(), "{model:?}");
-            let said = super::of(&of(model), &thin, &|| None).join("\n");
+            assert_eq!(super::of(&of(model), Shape::of(&thick), &|| None), Vec::<String>::new(), "{model:?}");
+            let said = super::of(&of(model), Shape::of(&thin), &|| None).join("\n");
             assert!(
                 said.contains("model of a half space") && said.contains("0.804 transport mean free paths"),
                 "{said}"
             );
             assert!(said.ends_with("take method `volume_path`"), "{said}");
-            let crossed = super::of(&of(model), &thin, &|| Some("it passes through itself".into())).join("\n");
+            let crossed =
+                super::of(&of(model), Shape::of(&thin), &|| Some("it passes through itself".into())).join("\n");
             assert!(crossed.ends_with("`volume_path` cannot trace it: it passes through itself"));
         }
-        assert!(super::of(&of(ModelName::DIRECTIONAL), &thick, &|| None)[0].contains("1.24 times"));
+        assert!(super::of(&of(ModelName::DIRECTIONAL), Shape::of(&thick), &|| None)[0].contains("1.24 times"));
     }
 
     /// Below and above the range of the table: said from 5 % on, with the model's own total and no remedy that is no better.
@@ -274,7 +275,7 @@ mod tests {
             exit_normalisation: true,
             source: String::new(),
         };
-        let said = |model, eta| super::of(&of(model, 0.01, eta), &thick, &|| None).join("\n");
+        let said = |model, eta| super::of(&of(model, 0.01, eta), Shape::of(&thick), &|| None).join("\n");
         for (model, eta, why) in [
             (ModelName::BETTER, 0.7, "with single scattering beside it, at g = 0 and eta = 0.7"),
             (ModelName::DIRECTIONAL, 1.9, "as published"),
@@ -296,7 +297,7 @@ mod tests {
         {
             let mut t = of(ModelName::DIRECTIONAL, 0.0, 1.3);
             t.medium.g = g;
-            let words = super::of(&t, &thick, &|| None).join("\n");
+            let words = super::of(&t, Shape::of(&thick), &|| None).join("\n");
             assert!(words.ends_with(remedy), "{words}");
         }
     }

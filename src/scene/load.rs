@@ -8,7 +8,7 @@ use super::objects::{Geometry, NormalsChoice, ObjectEntry};
 use super::options::MethodName;
 use super::values::unit_vector;
 use super::{
-    Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
+    Body, Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
@@ -56,15 +56,19 @@ impl Scene {
             said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
             let (name, at) = (entry.name.clone(), entry.at.clone());
             let (material, priority) = (entry.material, entry.priority);
-            objects.push(Object { name, mesh, at, material, flipped: entry.flip, findings, priority });
+            let parts = vec![name.clone()];
+            objects.push(Object { name, parts, mesh, at, material, flipped: entry.flip, findings, priority });
         }
+        let materials = materials(file);
+        let bodies = Body::all(&objects, &materials);
         let mut scene = Self {
             name: file.path.display().to_string(),
             unit_in_mm: file.unit_in_mm,
             centre,
             camera: camera(file, centre)?,
             objects,
-            materials: materials(file),
+            bodies,
+            materials,
             environment,
             why_double: None,
             warnings: Vec::new(),
@@ -73,7 +77,7 @@ impl Scene {
         let traced = file.method.name == Some(MethodName::VolumePath);
         let single = file.method.single != Some(false);
         let walks = |t: &Translucent| traced || single && warnings::no_first_order(t).is_some();
-        let choice = precision::choose(&scene.objects, &scene.materials, walks);
+        let choice = precision::choose(&scene.objects, &scene.bodies, &scene.materials, walks);
         if choice.why_double.is_some() {
             scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
         }
@@ -83,13 +87,12 @@ impl Scene {
         let method = file.method.name.unwrap_or_else(|| scene.default_method());
         let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath);
         for (number, what) in choice.beyond {
-            let entry = &file.objects[number];
             // What encloses nothing is not too thin besides, where that is said.
-            let name = &scene.objects[number].name;
+            let Object { name, at, .. } = &scene.objects[number];
             let sheet = |o: &Obstacle| o.kind == ObstacleKind::Sheet && o.objects.contains(name);
             let said_so = |o: &Obstacle| sheet(o) && o.warning(method).is_some();
             if !models_or_paths || !scene.obstacles().iter().any(said_so) {
-                said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
+                said.push(format!("{at}: object {name:?}: {what}"));
             }
         }
         if models_or_paths {

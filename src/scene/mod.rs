@@ -3,6 +3,7 @@
 //! `tree.rs` remembers the lines, `difference.rs` names them), `world.rs` (what the renderer sees),
 //! `load.rs` (the way from one to the other).
 
+mod body;
 mod camera;
 mod difference;
 mod doctor;
@@ -24,6 +25,7 @@ mod view;
 mod warnings;
 mod world;
 
+pub use body::Body;
 pub use environment::EnvironmentEntry;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;

@@ -40,8 +40,8 @@ impl Scene {
     }
 }
 
-/// An object with its solid.
-struct Body<'a> {
+/// An object with its solid: what is looked at.
+struct Shell<'a> {
     index: u32,
     object: &'a Object,
     kind: Role,
@@ -90,11 +90,11 @@ impl Found {
             }
         }
         pairs.sort_unstable();
-        let bodies: Vec<Option<Body<'_>>> = all
+        let bodies: Vec<Option<Shell<'_>>> = all
             .into_iter()
             .zip(wanted)
             .map(|((index, object, kind, bounds), wanted)| {
-                wanted.then(|| Body { index, object, kind, solid: Solid::new(&object.mesh), bounds, share })
+                wanted.then(|| Shell { index, object, kind, solid: Solid::new(&object.mesh), bounds, share })
             })
             .collect();
         let nests = Nests { meets: vec![false; scene.objects.len()], ..ranks(scene, &bodies) };
@@ -129,7 +129,7 @@ impl Found {
     }
 
     /// Two bodies that meet, or one that meets itself: which of their faces lie in each other.
-    fn join(&mut self, a: &Body<'_>, b: &Body<'_>) {
+    fn join(&mut self, a: &Shell<'_>, b: &Shell<'_>) {
         let gap = gap(a.share, &a.bounds, &b.bounds);
         let nests = &mut self.nests;
         (nests.meets[a.index as usize], nests.meets[b.index as usize]) = (true, true);
@@ -144,7 +144,7 @@ impl Found {
     }
 
     /// Whether the camera is in a body.
-    fn look_from(&mut self, scene: &Scene, body: &Body<'_>, solid: bool) {
+    fn look_from(&mut self, scene: &Scene, body: &Shell<'_>, solid: bool) {
         let camera = scene.camera.origin;
         let gap = gap(body.share, &body.bounds, &Aabb::around([camera]));
         let obstacle = |kind, what: String, remedy: String| Obstacle {
@@ -172,7 +172,7 @@ impl Found {
 }
 
 /// The order of bodies; no contacts yet.
-fn ranks(scene: &Scene, bodies: &[Option<Body<'_>>]) -> Nests {
+fn ranks(scene: &Scene, bodies: &[Option<Shell<'_>>]) -> Nests {
     let media = bodies.iter().flatten().filter(|b| b.kind == Role::Medium);
     let mut order: Vec<(i32, f64, u32)> =
         media.map(|b| (b.object.priority, -b.object.mesh.volume(), b.index)).collect();
@@ -198,7 +198,7 @@ const TURN: &str = "set flip = true, or --repair turns them";
 const TURN_BACK: &str = "leave out flip = true, or --repair turns them";
 
 /// What is wrong with one medium's mesh by itself; whether it has an inside.
-fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
+fn alone(scene: &Scene, body: &Shell<'_>, out: &mut Vec<Obstacle>) -> bool {
     let (solid, name) = (&body.solid, &body.object.name);
     let gap = gap(body.share, &body.bounds, &body.bounds);
     let mut say = |kind, what: String, remedy: &str| {
@@ -377,7 +377,7 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
 }
 
 /// What is wrong with a medium `a` and another object.
-fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obstacle> {
+fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Obstacle> {
     let gap = gap(a.share, &a.bounds, &b.bounds);
     let (one, other) = (&a.object.name, &b.object.name);
     let obstacle = |kind, what: String, remedy: String| {
@@ -459,8 +459,8 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
 }
 
 /// What two bodies are.
-fn kinds(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> &'static str {
-    let translucent = |body: &Body<'_>| scene.surface(body.index).is_translucent();
+fn kinds(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>) -> &'static str {
+    let translucent = |body: &Shell<'_>| scene.surface(body.index).is_translucent();
     if translucent(a) && translucent(b) { "the translucent objects" } else { "the bodies" }
 }
 

@@ -1,12 +1,12 @@
 //! Paths over bodies whose light a model has: there it is asked for, and only what the model lacks is walked.
 
-use super::body::{Body, Edge, MOST_SURFACES, Watch, survives};
 use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
 use super::draws::Draws;
+use super::interior::{Edge, Interior, MOST_SURFACES, Watch, survives};
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
-use super::{Asked, VolumePath, VolumePathOptions, endless_bodies, throughs};
+use super::{Asked, VolumePath, VolumePathOptions, endless, throughs};
 use crate::bssrdf::Exit;
 use crate::cache::{Plan, Step};
 use crate::geometry::SurfacePoint;
@@ -68,7 +68,7 @@ impl VolumePath {
     ) -> Self {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, ..options };
         let surfaces = Self::surfaces(scene, options);
-        let bodies = endless_bodies(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
+        let bodies = endless(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
         Self { throughs, bodies, modelled, bounces, ..surfaces }
     }
@@ -160,7 +160,7 @@ impl VolumePath {
     }
 
     /// The body of object number `object`, where paths walk in it.
-    fn body(&self, object: u32) -> Option<&Body> {
+    fn body(&self, object: u32) -> Option<&Interior> {
         self.bodies[object as usize].as_ref()
     }
 }
@@ -265,7 +265,7 @@ impl CameraPath<'_> {
     }
 
     /// Through a body from `at` along `w` without being scattered; the ray on which the path leaves.
-    fn straight(&mut self, body: &Body, at: &SurfacePoint, mut w: Vec3) -> Option<Ray> {
+    fn straight(&mut self, body: &Interior, at: &SurfacePoint, mut w: Vec3) -> Option<Ray> {
         let mut from = at.leave(w);
         for _ in 0..MOST_SURFACES {
             self.tally.rays.bounce += 1;
@@ -298,7 +298,7 @@ impl CameraPath<'_> {
         self.asked += 1;
         let exit = Exit { x: Vec3::ZERO, n: at.normal_seen_from(w), w };
         let Step { place, at: entry, weight } =
-            near.step(self.view, plan.body.object, (at.x, exit.n), stream, self.tally)?;
+            near.step(self.view, plan.body.object(), (at.x, exit.n), stream, self.tally)?;
         let entry = SurfacePoint { n: entry.n_geometric, ..entry };
         let w = cosine_hemisphere(entry.n, self.draws.pair());
         let sample = plan.body.enters(&entry, w, (Rgb::splat(PI), weight), self.draws.number())?;
@@ -316,7 +316,7 @@ impl CameraPath<'_> {
     }
 
     /// Whether light that was scattered as often as the path's is part of the model of `body`.
-    pub fn in_model(&self, body: &Body) -> bool {
+    pub fn in_model(&self, body: &Interior) -> bool {
         self.method.modelled[body.object as usize].is_some() && self.order > 1
     }
 }

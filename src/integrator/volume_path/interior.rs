@@ -1,4 +1,4 @@
-//! A translucent object from the inside: flights, collisions, the boundary, until light leaves.
+//! A body of the world from the inside: flights, collisions, the boundary, until light leaves.
 
 use super::draws::Draws;
 use super::facets::Bend;
@@ -13,9 +13,10 @@ use crate::scene::{Contacts, Surface};
 use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
 
-/// A homogeneous medium in the closed mesh of one object. Its boundary is the triangles themselves.
-pub struct Body {
-    /// Index of the object.
+/// What paths need of a body of the world ([`crate::scene::Body`]): its medium as they take it, how far it is to its surface, what is around it. Its
+/// boundary is the triangles themselves.
+pub struct Interior {
+    /// Index of the body's surface.
     pub object: u32,
     /// n_inside / n_outside.
     pub eta: f32,
@@ -111,7 +112,7 @@ pub enum Flight {
     Lost(Cause),
 }
 
-impl Body {
+impl Interior {
     /// The object number `object`, with a table of the surfaces in its box.
     pub fn new(object: u32, medium: &Medium, clearance: Clearance) -> Self {
         let coefficients = Coefficients::new(medium);
