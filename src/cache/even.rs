@@ -3,7 +3,6 @@
 use super::balance::Known;
 use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, Scratch, Tuning};
 use crate::bssrdf::{Exit, ModelName, ModelOptions, Partition};
-use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec4};
 use crate::optics::FresnelMoments;
 use crate::sampling::{CacheStream, PixelStream, Points, cosine_hemisphere};
@@ -39,20 +38,19 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
     let on_a_plane = own.map(|total| (f64::from(total) / (PI * exit)) as f32);
     let mesh = &view.scene.objects[body.object() as usize].mesh;
-    let flat = |(pick, u): (f64, [f32; 7])| {
-        let at = body.table().sample(pick, [u[0], u[1]]);
-        let at = mesh.point(at.triangle, at.u, at.v);
-        SurfacePoint { n: at.n_geometric, ..at }
-    };
+    let flat = |(pick, u): (f64, [f32; 7])| body.place(mesh, body.table().sample(pick, [u[0], u[1]]));
     let [light, points] = [1, 2].map(|k| CacheStream::new(Points::Sobol, seed, k << 32 | u64::from(body.object())));
     let enter = |i: u64| {
         let numbers = light.numbers(i);
-        let at = flat(numbers);
+        let at = flat(numbers)?;
         let w = cosine_hemisphere(at.n, [numbers.1[2], numbers.1[3]]);
-        body.enters(&at, w, (Rgb::WHITE, body.table().area() as f32), numbers.1[4])
+        Some(body.enters(&at, w, (Rgb::WHITE, body.table().area() as f32), numbers.1[4]))
     };
-    let lit: Vec<CachedSample> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
-    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / body.table().area();
+    let entering: Vec<Option<CachedSample>> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
+    // Of all area that of the body's surface: what lies inside a union bears no light.
+    let area = body.table().area() * (entering.len() as f64 / f64::from(samples));
+    let lit: Vec<CachedSample> = entering.into_iter().flatten().collect();
+    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / area;
     let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition: Partition::NONE };
     let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: samples }, &*body.model, tuning);
     let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(count)).map(|i| points.numbers(i)).collect();
@@ -62,11 +60,11 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
         .enumerate()
         .map(|(chunk, picks)| {
             let point = |(i, &numbers): (usize, &(f64, [f32; 7]))| {
-                let at = flat(numbers);
+                let at = flat(numbers)?;
                 let exit = Exit { x: (at.x - body.table().centre()).as_vec3(), n: at.n, w: at.n };
-                GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) }
+                Some(GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) })
             };
-            let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
+            let points: Vec<GatherPoint> = picks.iter().enumerate().filter_map(point).collect();
             let mut sums = Vec::new();
             plan.sum((&gatherer, Detail::Fine), &points, &mut Scratch::default(), &mut Tally::default(), &mut sums);
             let divisor = |sum: &Rgb| {
@@ -81,5 +79,5 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, divisor: divisor(sum) }).collect()
         })
         .collect();
-    Some(Balance::new(known.into_iter().flatten().collect(), body.table().area(), body.table().centre()))
+    Some(Balance::new(known.into_iter().flatten().collect(), area, body.table().centre()))
 }

@@ -19,6 +19,7 @@ mod shapes;
 mod solid;
 #[cfg(test)]
 mod test_shapes;
+mod union;
 mod weld;
 mod winding;
 
@@ -37,4 +38,5 @@ pub use obj_lines::LOADING_BYTES;
 pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};
 pub use solid::{Part, Seams, Solid};
+pub use union::Union;
 pub use weld::Seam;

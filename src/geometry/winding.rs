@@ -132,7 +132,7 @@ fn solid_angle(face: &Face, p: DVec3) -> f64 {
     2.0 * a.dot(b.cross(c)).atan2(below)
 }
 
-fn distance(face: &Face, p: DVec3) -> f64 {
+pub(super) fn distance(face: &Face, p: DVec3) -> f64 {
     let [a, b, c] = face.corners.map(|x| x - p);
     let n = face.scaled_normal().normalize_or_zero();
     let foot = n * a.dot(n);

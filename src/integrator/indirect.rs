@@ -206,7 +206,7 @@ impl Round<'_> {
         let first = u64::from(self.turn.number) * u64::from(self.of.count);
         let key = self.key(plan, 1);
         self.tasks(self.of.count, rows, tally, |i, found| {
-            let (at, weight, u) = filler.point(first + i);
+            let Some((at, weight, u)) = filler.point(first + i) else { return };
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { return };
             found.tally.rays.bounce += 1;
             let Some(hit) = self.view.rays.closest(&ray) else { return };
@@ -282,16 +282,14 @@ impl Round<'_> {
             .map(|(chunk, picks)| {
                 let mut found = Found::default();
                 let place = |(i, &(pick, u)): (usize, &(f64, [f32; 7]))| {
-                    let at = plan.body.table().sample(pick, [u[0], u[1]]);
-                    let at = mesh.point(at.triangle, at.u, at.v);
-                    let at = SurfacePoint { n: at.n_geometric, ..at };
+                    let at = plan.body.place(mesh, plan.body.table().sample(pick, [u[0], u[1]]))?;
                     let w = cosine_hemisphere(at.n, [u[2], u[3]]);
                     let exit = Exit { x: (at.x - plan.body.table().centre()).as_vec3(), n: at.n, w };
                     let stream = PixelStream::new(key, (chunk * CHUNK + i) as u64, 0);
-                    (at, GatherPoint { exit, place: at.x, stream })
+                    Some((at, GatherPoint { exit, place: at.x, stream }))
                 };
                 let (places, points): (Vec<SurfacePoint>, Vec<GatherPoint>) =
-                    picks.iter().enumerate().map(place).unzip();
+                    picks.iter().enumerate().filter_map(place).unzip();
                 let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
                 if level == 1 {
                     let around = (self.view, self.lights);
@@ -404,8 +402,7 @@ impl Round<'_> {
             self.turn.seed,
             u64::from(draws.number().to_bits()) << 32 | u64::from(draws.number().to_bits()),
         );
-        let step =
-            near.step(self.view, plan.body.object(), (at.x, at.n), PixelStream::new(key, 0, 0), &mut found.tally)?;
+        let step = near.step(self.view, &plan.body, (at.x, at.n), PixelStream::new(key, 0, 0), &mut found.tally)?;
         let out = SurfacePoint { n: step.at.n_geometric, ..step.at };
         let away = cosine_hemisphere(out.n, draws.pair());
         // The boundary has been passed by the choice not to mirror.

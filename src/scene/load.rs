@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::file::{FovAxis, SceneFile};
-use super::objects::{Geometry, NormalsChoice, ObjectEntry};
+use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
 use super::values::unit_vector;
 use super::{
@@ -42,10 +42,17 @@ impl Scene {
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
+        let mut placed: Vec<Option<ObjMesh>> = placed.into_iter().map(Some).collect();
         let mut objects = Vec::with_capacity(placed.len());
-        for (entry, mesh) in file.objects.iter().zip(placed) {
-            let alone = if entry.normals == NormalsChoice::Smooth { mesh.sharing_no_corner() } else { 0 };
-            let as_placed = mesh;
+        for group in grouped(&file.objects) {
+            let entry = &file.objects[group[0]];
+            let alone = |i: usize| match (&placed[i], file.objects[i].normals) {
+                (Some(mesh), NormalsChoice::Smooth) => mesh.sharing_no_corner(),
+                _ => 0,
+            };
+            let alone = group.iter().map(|&i| alone(i)).sum();
+            let meshes: Vec<ObjMesh> = group.iter().filter_map(|&i| placed[i].take()).collect();
+            let as_placed = one_mesh(meshes, centre);
             let mesh = as_placed.recentred(centre);
             drop(as_placed);
             if let Some(p) = mesh.positions.iter().find(|p| !p.as_vec3().is_finite()) {
@@ -54,10 +61,11 @@ impl Scene {
             }
             let findings = examine(&mesh);
             said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
-            let (name, at) = (entry.name.clone(), entry.at.clone());
+            let parts: Vec<String> = group.iter().map(|&i| file.objects[i].name.clone()).collect();
+            let name = entry.body.as_ref().filter(|_| parts.len() > 1).unwrap_or(&entry.name).clone();
+            let (at, flipped) = (entry.at.clone(), group.iter().any(|&i| file.objects[i].flip));
             let (material, priority) = (entry.material, entry.priority);
-            let parts = vec![name.clone()];
-            objects.push(Object { name, parts, mesh, at, material, flipped: entry.flip, findings, priority });
+            objects.push(Object { name, parts, mesh, at, material, flipped, findings, priority });
         }
         let materials = materials(file);
         let bodies = Body::all(&objects, &materials);
@@ -121,6 +129,18 @@ impl Scene {
     pub fn meshes(&self) -> Vec<&Mesh> {
         self.objects.iter().map(|o| &o.mesh).collect()
     }
+}
+
+/// The mesh of a body of several objects, or of one.
+fn one_mesh(mut meshes: Vec<ObjMesh>, centre: DVec3) -> ObjMesh {
+    if meshes.len() == 1 {
+        return meshes.pop().unwrap_or_default();
+    }
+    let closed = |mesh: &ObjMesh| {
+        let found = examine(&mesh.recentred(centre));
+        found.open_edges == 0 && found.mixed_edges == 0
+    };
+    ObjMesh::joined(meshes.into_iter().map(|mesh| (closed(&mesh), mesh)).map(|(closed, mesh)| (mesh, closed)).collect())
 }
 
 /// The objects' meshes in the scene's space, in f64.

@@ -59,6 +59,9 @@ pub struct Obstacle {
     pub remedy: String,
     /// Whether a remark on the mesh says it already.
     pub(super) said: bool,
+    /// Whether these are closed parts of one body, of which every method takes the union.
+    #[serde(skip)]
+    pub(super) united: bool,
 }
 
 impl Obstacle {
@@ -87,7 +90,7 @@ impl Obstacle {
             (MethodName::AmbientOcclusion | MethodName::Direct, _) => return None,
             (_, OpaqueTouching) => "light may pass there from one side to the other",
             (_, Unknown) => "what is inside is not known there",
-            _ if self.said => return None,
+            _ if self.said || self.united => return None,
             (MethodName::VolumePath, Hidden) => "nothing of it is seen",
             (MethodName::VolumePath, Blemish) => "paths that come there are lost, and counted",
             (MethodName::VolumePath, _) | (_, Blemish) => return None,

@@ -3,9 +3,10 @@
 
 use super::insides::{Found, Nests, Partner};
 use super::{Object, Obstacle, ObstacleKind, Scene};
-use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, lying, meeting, mended};
+use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, Union, lying, meeting, mended};
 use crate::math::{Aabb, DVec3};
 use crate::words::{self, counted, either, percent};
+use std::sync::Arc;
 
 /// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
 const OFFSETS: f64 = 2.0;
@@ -32,6 +33,13 @@ impl Scene {
     /// The bodies that the camera stands in, each with how often its surface is around it.
     pub fn camera_in(&self) -> &[(u32, u32)] {
         &self.insides.0.get_or_init(|| Found::new(self)).camera_in
+    }
+
+    /// What bounds the body of object number `object`, where its parts overlap, touch or lie in one another; `None` where all of its surface does, and
+    /// where some part is open.
+    pub fn union(&self, object: u32) -> Option<&Arc<Union>> {
+        let unions = &self.insides.0.get_or_init(|| Found::new(self)).unions;
+        unions.get(object as usize)?.as_ref()
     }
 
     /// Which body is where bodies overlap or touch.
@@ -103,7 +111,11 @@ impl Found {
             let before = found.obstacles.len();
             let solid = alone(scene, body, &mut found.obstacles);
             found.look_from(scene, body, solid);
-            found.nests.meets[body.index as usize] = found.obstacles[before..].iter().any(|o| o.overlaps());
+            let own = &mut found.obstacles[before..];
+            found.nests.meets[body.index as usize] = own.iter().any(|o| o.overlaps());
+            if body.solid.parts.iter().all(|p| p.closed) {
+                own.iter_mut().for_each(|o| o.united = o.overlaps());
+            }
         }
         let (mut meet, mut meets) = (0, vec![false; bodies.len()]);
         for (i, j) in pairs {
@@ -123,6 +135,14 @@ impl Found {
         for body in bodies.iter().flatten().filter(|b| b.solid.parts.len() > 1) {
             if found.nests.meets[body.index as usize] {
                 found.join(body, body);
+            }
+        }
+        found.unions.resize_with(scene.objects.len(), || None);
+        for body in bodies.into_iter().flatten() {
+            let united = |o: &Obstacle| o.united && o.objects[0] == body.object.name;
+            if found.obstacles.iter().any(united) {
+                let (gap, count) = (gap(share, &body.bounds, &body.bounds), body.object.mesh.triangles.len());
+                found.unions[body.index as usize] = Some(Arc::new(Union::new(body.solid, count, gap)));
             }
         }
         found
@@ -154,6 +174,7 @@ impl Found {
             what,
             remedy,
             said: false,
+            united: false,
         };
         let name = &body.object.name;
         if body.solid.is_near(camera, gap) {
@@ -212,6 +233,7 @@ fn alone(scene: &Scene, body: &Shell<'_>, out: &mut Vec<Obstacle>) -> bool {
                 ObstacleKind::Turned => body.object.findings.inside_out(),
                 _ => false,
             },
+            united: false,
             what: format!("object {name:?}: {what}"),
             remedy: if remedy == TURN && body.object.flipped { TURN_BACK.into() } else { remedy.into() },
         });
@@ -229,7 +251,9 @@ fn alone(scene: &Scene, body: &Shell<'_>, out: &mut Vec<Obstacle>) -> bool {
     }
     seams(solid, gap, &mut say);
     if !solid.is_convex(gap) {
-        meets_itself(scene, solid, gap, &mut say);
+        // Of parts that were declared each counts, however small.
+        let minor = if body.object.parts.len() > 1 { 0.0 } else { MINOR };
+        meets_itself(scene, solid, (gap, minor), &mut say);
     }
     solid.seams.hole_share <= MOSTLY_HOLES
 }
@@ -276,10 +300,15 @@ fn seams(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &st
 }
 
 /// Parts in one another, and a part that passes through itself.
-fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+fn meets_itself(
+    scene: &Scene,
+    solid: &Solid,
+    (gap, minor): (f64, f64),
+    say: &mut impl FnMut(ObstacleKind, String, &str),
+) {
     let parts = &solid.parts;
     let area: f64 = parts.iter().map(|p| p.area).sum();
-    let large = |i: u32| parts[i as usize].area > MINOR * area;
+    let large = |i: u32| parts[i as usize].area > minor * area;
     let found = meeting(solid, solid, gap, Seek::Crossing, |[a, b]| a != b && large(a) && large(b));
     let all = parts.len();
     let union = "make one surface of them (a union), or cut one out of the other";
@@ -299,7 +328,7 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
         let what = format!("too many faces of its {all} parts are in one place to look at all");
         say(ObstacleKind::Unknown, what, "");
     }
-    parts_in_parts(solid, gap, say);
+    parts_in_parts(solid, (gap, minor), say);
     if let Some(c) = &found.minor {
         let share = solid.hidden_share().max(found.minor_area / area);
         if share < LEAST {
@@ -320,7 +349,7 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
 }
 
 /// Parts inside others: right as cavities, and as bodies in cavities.
-fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+fn parts_in_parts(solid: &Solid, (gap, minor): (f64, f64), say: &mut impl FnMut(ObstacleKind, String, &str)) {
     let parts = &solid.parts;
     let area: f64 = parts.iter().map(|p| p.area).sum();
     let [mut nested, mut open, mut turned] = [(0_usize, 0.0); 3];
@@ -360,7 +389,7 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
         ),
     ];
     for (kind, (count, part), [one, many]) in inside {
-        let kind = if part > MINOR * area { kind } else { ObstacleKind::Blemish };
+        let kind = if part > minor * area { kind } else { ObstacleKind::Blemish };
         if count > 0 {
             say(kind, format!("{count} of its {all} parts {}", either(count, one, many)), cavity);
         }
@@ -382,7 +411,7 @@ fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Ob
     let (one, other) = (&a.object.name, &b.object.name);
     let obstacle = |kind, what: String, remedy: String| {
         let (objects, at) = (vec![one.clone(), other.clone()], b.object.at.clone());
-        Some(Obstacle { kind, objects, at, what, remedy, said: false })
+        Some(Obstacle { kind, objects, at, what, remedy, said: false, united: false })
     };
     let seek = if b.kind == Role::Opaque { Seek::Touching } else { Seek::Crossing };
     let found = meeting(&a.solid, &b.solid, gap, seek, |_| true);

@@ -30,7 +30,7 @@ use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
-use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
+use crate::scene::{Contacts, Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
 use crate::surface::Lambertian;
 use crate::tally::{Cause, Tally};
 use crate::words::short;
@@ -325,7 +325,12 @@ fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
 
 /// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault: the models beside know nothing of them either.
 fn endless(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior>> {
-    let lone = |interior: Interior| Interior { endless: true, nested: false, ..interior };
+    let lone = |interior: Interior| {
+        let union = scene.union(interior.object).cloned();
+        // Where its own parts lie in each other is no face of another body.
+        let contacts = if union.is_some() { Contacts::new() } else { interior.contacts };
+        Interior { endless: true, nested: false, union, contacts, ..interior }
+    };
     let of = |i| if wanted(i) { interior(scene, i, 1).map(lone) } else { None };
     (0..scene.objects.len()).map(of).collect()
 }

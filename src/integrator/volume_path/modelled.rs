@@ -269,8 +269,7 @@ impl CameraPath<'_> {
         let mut from = at.leave(w);
         for _ in 0..MOST_SURFACES {
             self.tally.rays.bounce += 1;
-            let hit = self.view.rays.closest(&Ray::new(from, w)).filter(|hit| hit.mesh == body.object)?;
-            let at = self.view.outwards(&hit);
+            let (hit, at) = body.closest(self.view, Ray::new(from, w)).filter(|(hit, _)| hit.mesh == body.object)?;
             if at.n_geometric.dot(w) <= 0.0 {
                 return None;
             }
@@ -297,8 +296,7 @@ impl CameraPath<'_> {
         let stream = self.stream.aside(hash_combine(STEP, self.asked.into()));
         self.asked += 1;
         let exit = Exit { x: Vec3::ZERO, n: at.normal_seen_from(w), w };
-        let Step { place, at: entry, weight } =
-            near.step(self.view, plan.body.object(), (at.x, exit.n), stream, self.tally)?;
+        let Step { place, at: entry, weight } = near.step(self.view, &plan.body, (at.x, exit.n), stream, self.tally)?;
         let entry = SurfacePoint { n: entry.n_geometric, ..entry };
         let w = cosine_hemisphere(entry.n, self.draws.pair());
         let sample = plan.body.enters(&entry, w, (Rgb::splat(PI), weight), self.draws.number())?;

@@ -219,8 +219,11 @@ fn is_open(
         return false;
     }
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
+    if body.union.as_ref().is_some_and(|union| !union.bears(crossing.triangle, at.x)) {
+        return false;
+    }
     tally.rays += 1;
-    if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
+    if !body.lets_through(view, Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
         return false;
     }
     tally.rays += 1;
