@@ -17,6 +17,9 @@ pub struct Union {
     faces: Vec<(u32, Side)>,
 }
 
+/// Pairs of faces that a task looks at, at most.
+const MOST_PAIRS: usize = 1 << 22;
+
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Side {
     /// All of it.
@@ -31,19 +34,21 @@ impl Union {
     /// Of the parts of `solid`, which is made of so many `triangles`; surfaces nearer than `gap` [unit] are in one place.
     pub fn new(solid: Solid, triangles: usize, gap: f64) -> Self {
         let near = |task: &(u32, u32)| {
-            let mut near = Vec::new();
+            let (mut near, mut seen) = (Vec::new(), 0);
             solid.tree.pairs(&solid.tree, *task, gap as f32, |i, j| {
+                seen += 1;
                 if solid.may_meet(i, j, gap) {
                     near.extend([i, j]);
                 }
-                false
+                seen > MOST_PAIRS
             });
-            near
+            (seen <= MOST_PAIRS).then_some(near)
         };
         let tasks = solid.tree.tasks(&solid.tree, gap as f32);
-        let mut mixed = vec![false; solid.faces.len()];
-        let near: Vec<Vec<u32>> = tasks.par_iter().map(near).collect();
-        near.into_iter().flatten().for_each(|i| mixed[i as usize] = true);
+        // With too many faces in one place to look at, points are looked at one by one.
+        let near: Option<Vec<Vec<u32>>> = tasks.par_iter().map(near).collect();
+        let mut mixed = vec![near.is_none(); solid.faces.len()];
+        near.into_iter().flatten().flatten().for_each(|i| mixed[i as usize] = true);
         let side = |(face, mixed): (&Face, &bool)| {
             let [a, b, c] = face.corners;
             match () {

@@ -1,11 +1,8 @@
 //! The bodies of the world: what every method asks of them, found once when a scene is loaded.
 
-use super::energy::Shape;
-use super::{Material, Object};
-use crate::geometry::AreaTable;
+use crate::geometry::{AreaTable, Findings, Mesh};
 use crate::math::Aabb;
 use crate::optics::Medium;
-use std::sync::Arc;
 
 /// A set of parts with one medium inside: the surface of one object of the scene file, or of several that are one body. Methods keep what they need
 /// besides: models and caches, distances and photons.
@@ -29,28 +26,49 @@ pub struct Body {
 }
 
 impl Body {
-    /// One for each object; `None` where there is no medium behind it, or no area.
-    pub fn all(objects: &[Object], materials: &[Material]) -> Vec<Option<Arc<Self>>> {
-        let of = |(index, object): (u32, &Object)| {
-            let medium = materials[object.material].surface.medium()?;
-            let (bounds, table) = (object.mesh.bounds()?, AreaTable::new(&object.mesh)?);
-            let shape = Shape::of(object);
-            Some(Arc::new(Self {
-                object: index,
-                parts: object.parts.clone(),
-                medium,
-                bounds,
-                table,
-                closed: object.findings.volume.is_some_and(|v| v > 0.0),
-                thickness: shape.map(|shape| shape.thickness),
-                curvature: shape.map(|shape| shape.curvature),
-            }))
-        };
-        (0..).zip(objects).map(of).collect()
+    /// What `medium` fills behind the surface `mesh`, number `object` in the world, in which `found` is wrong; made of objects of these names. `None` without area.
+    pub fn new(object: u32, parts: &[String], medium: Medium, mesh: &Mesh, found: &Findings) -> Option<Self> {
+        let (bounds, table) = (mesh.bounds()?, AreaTable::new(mesh)?);
+        let shape = Shape::of(mesh, found);
+        Some(Self {
+            object,
+            parts: parts.to_vec(),
+            medium,
+            bounds,
+            table,
+            closed: found.volume.is_some_and(|v| v > 0.0),
+            thickness: shape.map(|shape| shape.thickness),
+            curvature: shape.map(|shape| shape.curvature),
+        })
     }
 
     /// The sheet, rod or ball that it is most like.
     pub(super) fn shape(&self) -> Option<Shape> {
         Some(Shape { thickness: self.thickness?, curvature: self.curvature? })
+    }
+}
+
+/// The sheet, rod or ball that a closed body is most like, from volume V, area S and the mean M of the curvature over it, all of
+/// the mesh itself: 2V/S is the thickness of a sheet, the radius of a rod, two thirds of the radius of a ball, and 2V/S M
+/// is 0, 1/2, 2/3.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shape {
+    /// Way through it along the normal \[unit\].
+    pub thickness: f64,
+    /// Mean curvature [1/unit]: 0 of a sheet, 1/2r of a rod, 1/r of a ball.
+    pub curvature: f64,
+}
+
+impl Shape {
+    /// `None` for a mesh that encloses nothing.
+    pub fn of(mesh: &Mesh, found: &Findings) -> Option<Self> {
+        let (volume, bend) = (found.volume.filter(|v| *v > 0.0)?, found.bend?);
+        let area: f64 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
+        let shortest = mesh.bounds()?.extent().min_element();
+        let (sheet, curvature) = (2.0 * volume / area, bend / area);
+        // Convex bodies have at most 2/3 [Minkowski].
+        let round = (sheet * curvature).clamp(0.0, 2.0 / 3.0);
+        let thickness = (sheet / (1.0 - round)).min(shortest);
+        thickness.is_finite().then_some(Self { thickness, curvature: round / sheet })
     }
 }

@@ -8,7 +8,7 @@ use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
 use super::values::unit_vector;
 use super::{
-    Body, Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
+    Camera, Insides, Material, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, warnings,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
@@ -68,7 +68,7 @@ impl Scene {
             objects.push(Object { name, parts, mesh, at, material, flipped, findings, priority });
         }
         let materials = materials(file);
-        let bodies = Body::all(&objects, &materials);
+        let bodies = Self::bodies_of(&objects, &materials);
         let mut scene = Self {
             name: file.path.display().to_string(),
             unit_in_mm: file.unit_in_mm,

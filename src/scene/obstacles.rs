@@ -113,7 +113,8 @@ impl Found {
             found.look_from(scene, body, solid);
             let own = &mut found.obstacles[before..];
             found.nests.meets[body.index as usize] = own.iter().any(|o| o.overlaps());
-            if body.solid.parts.iter().all(|p| p.closed) {
+            // As paths would have it: not where some look inwards with nothing around them.
+            if body.solid.parts.iter().all(|p| p.closed) && own.iter().all(|o| o.refusal().is_none()) {
                 own.iter_mut().for_each(|o| o.united = o.overlaps());
             }
         }

@@ -163,6 +163,15 @@ pub struct Translucent {
 }
 
 impl Scene {
+    /// The bodies of `objects`, for [`Self::bodies`].
+    pub fn bodies_of(objects: &[Object], materials: &[Material]) -> Vec<Option<Arc<Body>>> {
+        let of = |(index, o): (u32, &Object)| {
+            let medium = materials[o.material].surface.medium()?;
+            Body::new(index, &o.parts, medium, &o.mesh, &o.findings).map(Arc::new)
+        };
+        (0..).zip(objects).map(of).collect()
+    }
+
     /// Whether an obstacle of this kind concerns one of [`Self::objects`].
     pub fn has(&self, object: &Object, kind: ObstacleKind) -> bool {
         self.obstacles().iter().any(|o| o.kind == kind && o.objects.contains(&object.name))

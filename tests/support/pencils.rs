@@ -104,7 +104,7 @@ impl Body {
             unit_in_mm: None,
             centre: DVec3::ZERO,
             camera,
-            bodies: marmor::scene::Body::all(&objects, &materials),
+            bodies: Scene::bodies_of(&objects, &materials),
             objects,
             materials,
             environment: Rgb::BLACK.into(),
