@@ -1,5 +1,6 @@
 //! One body of several parts: cut, overlapping, nested, as open shells, it is the body that it makes together, by every method.
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
+#![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
 mod rendering;
 #[path = "../src/geometry/test_shapes.rs"]

@@ -166,7 +166,6 @@ mod tests {
         for (what, mesh, outer, inner) in cases {
             let [bears, hides, all] = areas(&mesh, n);
             let noise = |share: f64| (share * (1.0 - share) / n as f64).sqrt() * all;
-            println!("{what}: {bears:.3} of {outer}, {hides:.3} of {inner}");
             for (found, right) in [(bears, outer), (hides, inner)] {
                 assert!((found - right).abs() <= 5.0 * noise(right / all) + 1e-9, "{what}: {found} for {right}");
             }

@@ -436,7 +436,7 @@ fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Ob
             }
             let how = if found.crossing.is_some() {
                 "partly inside"
-            } else if holds(&a.solid, &b.solid) {
+            } else if a.solid.holds(&b.solid) {
                 "inside"
             } else {
                 return None;
@@ -463,7 +463,7 @@ fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Ob
                 let remedy = format!("{apart}, or join them into one mesh without the faces between");
                 return obstacle(ObstacleKind::Touching, what, remedy);
             }
-            let (outer, inner) = match (holds(&a.solid, &b.solid), holds(&b.solid, &a.solid)) {
+            let (outer, inner) = match (a.solid.holds(&b.solid), b.solid.holds(&a.solid)) {
                 (true, _) => (a, b),
                 (_, true) => (b, a),
                 _ if found.unfinished => {
@@ -479,7 +479,7 @@ fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Ob
             let what =
                 format!("{} {one:?} and {other:?} overlap: {inside:?} lies inside {outside:?}", kinds(scene, a, b));
             let hidden = nests.rank[inner.index as usize] < nests.rank[outer.index as usize];
-            if hidden && bodies_in(&inner.solid, &outer.solid) {
+            if hidden && outer.solid.holds_all(&inner.solid) {
                 let remedy = format!("give {inside:?} a priority above {}", outer.object.priority);
                 return obstacle(ObstacleKind::Hidden, what, remedy);
             }
@@ -492,17 +492,4 @@ fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Ob
 fn kinds(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>) -> &'static str {
     let translucent = |body: &Shell<'_>| scene.surface(body.index).is_translucent();
     if translucent(a) && translucent(b) { "the translucent objects" } else { "the bodies" }
-}
-
-/// Whether all of `inner` is inside `outer`, where their surfaces do not cross.
-fn bodies_in(inner: &Solid, outer: &Solid) -> bool {
-    (0..inner.parts.len()).all(|i| outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0))
-}
-
-/// Whether a part of `inner` is inside `outer`, where their surfaces do not cross.
-fn holds(outer: &Solid, inner: &Solid) -> bool {
-    let Some(bounds) = outer.bounds() else { return false };
-    inner.parts.iter().enumerate().any(|(i, part)| {
-        part.bounds.is_near(&bounds, 0.0) && outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0)
-    })
 }
