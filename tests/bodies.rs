@@ -124,7 +124,7 @@ fn straight() -> SubsurfaceOptions {
 }
 
 /// A standard error from ten values is known to some 25 %: 8 of them stand for 6 of a known one.
-const CLOSE: Within = Within { errors: 8.0, noise: 0.006 };
+const CLOSE: Within = Within { errors: 8.0, noise: 0.01 };
 
 fn lit(more: &str) -> String {
     format!("{BELOW}{LAMP}{MILK}{more}")
