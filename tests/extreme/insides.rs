@@ -102,7 +102,7 @@ fn meets(scene: &Scene, kind: ObstacleKind, words: &[&str]) {
 fn unites(scene: &Scene, kind: ObstacleKind) {
     assert!(scene.obstacles().iter().any(|o| o.kind == kind), "{:?}", scene.obstacles());
     assert!(scene.union(0).is_some());
-    assert_eq!(scene.warnings, [""; 0]);
+    assert!(!scene.warnings.iter().any(|w| w.contains("parts")), "{:?}", scene.warnings);
     white(scene);
 }
 
