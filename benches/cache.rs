@@ -72,8 +72,7 @@ struct Bench<'a> {
 
 impl Bench<'_> {
     fn body(&self, model: Box<dyn Bssrdf>) -> Receiver {
-        let table = AreaTable::new(&self.scene.objects[0].mesh).unwrap();
-        Receiver { object: 0, table, model, eta: 1.3 }
+        Receiver::new(self.scene, 0, model).unwrap()
     }
 
     fn fill(&self, body: &Receiver, count: u32) -> Cache {

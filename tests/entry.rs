@@ -8,7 +8,6 @@ use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
 use marmor::cache::{
     CachedSample, Density, Directions, Envelope, Filler, GatherPoint, NearField, Receiver, Survey, seen,
 };
-use marmor::geometry::AreaTable;
 use marmor::light::Lights;
 use marmor::math::{Rgb, Vec3};
 use marmor::optics::Medium;
@@ -44,9 +43,9 @@ impl Set {
     fn new(scene: Scene, name: ModelName) -> Self {
         let scene: &'static Scene = Box::leak(Box::new(scene));
         let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
-        let (lights, table) = (Lights::new(scene), AreaTable::new(&scene.objects[0].mesh).unwrap());
+        let lights = Lights::new(scene);
         let model = name.build(&MEDIUM, &ModelOptions::DEFAULT).unwrap();
-        Self { rays, lights, body: Receiver { object: 0, table, model, eta: MEDIUM.eta }, scene }
+        Self { rays, lights, body: Receiver::new(scene, 0, model).unwrap(), scene }
     }
 
     fn view(&self) -> View<'_> {
@@ -139,7 +138,7 @@ impl Set {
         let hit = self.rays.closest(&query::Ray::new(9.0 * from.as_dvec3(), -from)).unwrap();
         let at = self.scene.objects[0].mesh.point(hit.triangle, hit.u, hit.v);
         let n = (at.n_geometric + tilt * Vec3::new(0.3, -0.5, 0.8)).normalize();
-        Exit { x: (at.x - self.body.table.centre()).as_vec3(), n, w: at.n_geometric }
+        Exit { x: (at.x - self.body.table().centre()).as_vec3(), n, w: at.n_geometric }
     }
 
     /// Mean and standard error of the near field at each of `exits`: what their lines find together, and what caches have.
@@ -149,7 +148,7 @@ impl Set {
         let own = |run: u64| {
             let point = |(i, &exit): (u64, &Exit)| {
                 let stream = PixelStream::new(5, run * exits.len() as u64 + i, 3);
-                GatherPoint { exit, place: self.body.table.centre() + exit.x.as_dvec3(), stream }
+                GatherPoint { exit, place: self.body.table().centre() + exit.x.as_dvec3(), stream }
             };
             let points: Vec<GatherPoint> = (0..).zip(exits).map(point).collect();
             let (mut sums, mut tally) = (vec![Rgb::BLACK; exits.len()], Tally::default());

@@ -32,7 +32,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let body = &plan.body;
     let samples = plan.samples.clamp(SAMPLES[0], SAMPLES[1]);
     let count = (samples / SAMPLES_PER_POINT).min(if plan.near.is_some() { NEAR[0] } else { u32::MAX });
-    let surface = view.scene.surface(body.object).inside.as_ref()?;
+    let surface = view.scene.surface(body.object()).inside.as_ref()?;
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
     let own = body.model.total_of_all_faces();
@@ -40,21 +40,20 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
     let on_a_plane = own.map(|total| (f64::from(total) / (PI * exit)) as f32);
-    let mesh = &view.scene.objects[body.object as usize].mesh;
-    let flat = |(pick, u): (f64, [f32; 7])| {
-        let at = body.table.sample(pick, [u[0], u[1]]);
-        let at = mesh.point(at.triangle, at.u, at.v);
-        SurfacePoint { n: at.n_geometric, ..at }
-    };
-    let [light, points] = [1, 2].map(|k| CacheStream::new(Points::Sobol, seed, k << 32 | u64::from(body.object)));
+    let mesh = &view.scene.objects[body.object() as usize].mesh;
+    let flat = |(pick, u): (f64, [f32; 7])| body.place(mesh, body.table().sample(pick, [u[0], u[1]]));
+    let [light, points] = [1, 2].map(|k| CacheStream::new(Points::Sobol, seed, k << 32 | u64::from(body.object())));
     let enter = |i: u64| {
         let numbers = light.numbers(i);
-        let at = flat(numbers);
+        let at = flat(numbers)?;
         let w = cosine_hemisphere(at.n, [numbers.1[2], numbers.1[3]]);
-        body.enters(&at, w, (Rgb::WHITE, body.table.area() as f32), numbers.1[4])
+        Some(body.enters(&at, w, (Rgb::WHITE, body.table().area() as f32), numbers.1[4]))
     };
-    let lit: Vec<CachedSample> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
-    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / body.table.area();
+    let entering: Vec<Option<CachedSample>> = (0..u64::from(samples)).into_par_iter().filter_map(enter).collect();
+    // Of all area that of the body's surface: what lies inside a union bears no light.
+    let area = body.table().area() * (entering.len() as f64 / f64::from(samples));
+    let lit: Vec<CachedSample> = entering.into_iter().flatten().collect();
+    let entered: f64 = lit.iter().map(|s| f64::from(s.flux[0])).sum::<f64>() / f64::from(samples) / area;
     let partition = plan.near.as_ref().map_or(Partition::NONE, |near| near.rest);
     let tuning = Tuning { error: ERROR, floor: Vec4::ZERO, partition };
     let gatherer = Gatherer::new(Estimator::Cut, Cache { lit, attempted: samples }, &*body.model, tuning);
@@ -65,11 +64,11 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
         .enumerate()
         .map(|(chunk, picks)| {
             let point = |(i, &numbers): (usize, &(f64, [f32; 7]))| {
-                let at = flat(numbers);
-                let exit = Exit { x: (at.x - body.table.centre()).as_vec3(), n: at.n, w: at.n };
-                GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) }
+                let at = flat(numbers)?;
+                let exit = Exit { x: (at.x - body.table().centre()).as_vec3(), n: at.n, w: at.n };
+                Some(GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) })
             };
-            let points: Vec<GatherPoint> = picks.iter().enumerate().map(point).collect();
+            let points: Vec<GatherPoint> = picks.iter().enumerate().filter_map(point).collect();
             let mut sums = Vec::new();
             let (mut scratch, mut tally) = (Scratch::default(), Tally::default());
             plan.unbalanced_sum((&gatherer, Detail::Fine), &points, &mut scratch, &mut tally, &mut sums);
@@ -88,7 +87,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, divisor: divisor(sum) }).collect()
         })
         .collect();
-    Some(Balance::new(known.into_iter().flatten().collect(), body.table.area(), body.table.centre()))
+    Some(Balance::new(known.into_iter().flatten().collect(), area, body.table().centre()))
 }
 
 /// The mean of `count` samples of what even light close to `point` brings there.
@@ -98,7 +97,7 @@ fn near_part(plan: &Plan, view: View<'_>, point: &GatherPoint, count: u32, tally
     let mut one = |k: u32| {
         let numbers = point.stream.split(k, count);
         let u = numbers.aside(EVEN_LIGHT).next_4d();
-        let step = near.step(view, plan.body.object, (point.place, exit.n), numbers, tally)?;
+        let step = near.step(view, &plan.body, (point.place, exit.n), numbers, tally)?;
         let at = SurfacePoint { n: step.at.n_geometric, ..step.at };
         let w = cosine_hemisphere(at.n, [u[0], u[1]]);
         let sample = plan.body.enters(&at, w, (Rgb::WHITE, step.weight), u[2])?;

@@ -2,23 +2,24 @@
 
 use super::{Cache, CachedSample, Density};
 use crate::bssrdf::{Bssrdf, Entry};
-use crate::geometry::{AreaTable, SurfacePoint};
+use crate::geometry::{AreaSample, AreaTable, Mesh, SurfacePoint, Union};
 use crate::light::{Arrival, Lights, Met};
 use crate::math::{Rgb, Vec3};
 use crate::optics::{refract, transmittance};
 use crate::query::Ray;
 use crate::sampling::CacheStream;
-use crate::scene::View;
+use crate::scene::{Body, Scene, View};
 use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::sync::Arc;
 
-/// A translucent object as light enters it.
+/// A body as light enters it, by its model.
 pub struct Receiver {
-    /// Its number.
-    pub object: u32,
-    /// Its area table; cached points are relative to its centre.
-    pub table: AreaTable,
+    /// The body itself.
+    pub body: Arc<Body>,
+    /// What bounds it, where its parts meet.
+    pub union: Option<Arc<Union>>,
     /// Its BSSRDF, which says at what depth a sample stands.
     pub model: Box<dyn Bssrdf>,
     /// Its relative index of refraction.
@@ -26,13 +27,38 @@ pub struct Receiver {
 }
 
 impl Receiver {
+    /// Of object number `object` by `model`; `None` where that bounds no body.
+    pub fn new(scene: &Scene, object: u32, model: Box<dyn Bssrdf>) -> Option<Self> {
+        let body = scene.body(object)?.clone();
+        Some(Self { eta: body.medium.eta, body, union: scene.union(object).cloned(), model })
+    }
+
+    /// Index of its surface.
+    pub fn object(&self) -> u32 {
+        self.body.object
+    }
+
+    /// Its area table; cached points are relative to its centre.
+    pub fn table(&self) -> &AreaTable {
+        &self.body.table
+    }
+
+    /// A point of the surface, flat as the triangle it lies on; `None` where it lies inside the body, or in a face that counts instead. The
+    /// density stays that of all of the area.
+    pub fn place(&self, mesh: &Mesh, at: AreaSample) -> Option<SurfacePoint> {
+        let point = mesh.point(at.triangle, at.u, at.v);
+        let bears = self.union.as_ref().is_none_or(|union| union.bears(at.triangle, point.x));
+        // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
+        bears.then_some(SurfacePoint { n: point.n_geometric, ..point })
+    }
+
     /// Light as it enters at `at`, flat as the triangle it lies on, seen from there in the unit direction `w`: `irradiance` times
     /// `weight` [unit²] before the boundary, `u` in [0, 1) for the depth. `None` where it is totally reflected.
     pub fn enters(&self, at: &SurfacePoint, w: Vec3, (irradiance, weight): (Rgb, f32), u: f32) -> Option<CachedSample> {
         let refracted = refract(w, at.n, self.eta)?;
         let flux = irradiance * (transmittance(self.eta, w.dot(at.n)) * weight);
         (!flux.is_black()).then(|| CachedSample {
-            entry: Entry { x: (at.x - self.table.centre()).as_vec3(), n: at.n, w: refracted },
+            entry: Entry { x: (at.x - self.table().centre()).as_vec3(), n: at.n, w: refracted },
             depth: self.model.sample_depth(u),
             flux,
         })
@@ -106,7 +132,7 @@ impl Filler<'_> {
     /// The first `count` samples of the stream that meet light, each with its place along the area table.
     pub fn pilots(&self, count: u32) -> Vec<(f64, CachedSample)> {
         let lit = |number: u64| {
-            let (at, weight, u) = self.point(number);
+            let (at, weight, u) = self.point(number)?;
             let place = self.density.place(self.stream.numbers(number).0).0;
             let (sample, shadow) = self.entering(at, weight, u, &mut Tally::default())?;
             let hidden = shadow.is_some_and(|shadow| self.view.rays.occluded(&shadow.ray));
@@ -119,7 +145,7 @@ impl Filler<'_> {
     fn by_light(&self, numbers: std::ops::Range<u64>, tally: &mut Tally) -> Vec<CachedSample> {
         let mut candidates = Vec::with_capacity(CHUNK as usize);
         for number in numbers {
-            let (at, weight, u) = self.point(number);
+            let Some((at, weight, u)) = self.point(number) else { continue };
             candidates.extend(self.entering(at, weight, u, tally));
         }
         let shadows: Vec<Ray> = candidates.iter().filter_map(|(_, shadow)| Some(shadow.as_ref()?.ray)).collect();
@@ -175,7 +201,7 @@ impl Filler<'_> {
     fn by_cosine(&self, numbers: std::ops::Range<u64>, tally: &mut Tally) -> Vec<CachedSample> {
         let mut lit = Vec::new();
         for number in numbers {
-            let (at, weight, u) = self.point(number);
+            let Some((at, weight, u)) = self.point(number) else { continue };
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { continue };
             tally.rays.bounce += 1;
             let Met { radiance, light } = self.lights.met(self.view.scene, self.view.rays.closest(&ray).as_ref(), w);
@@ -192,7 +218,7 @@ impl Filler<'_> {
     /// Light that comes straight from the lights to point number `number`: the point, the unit direction to the light, and flux
     /// before the boundary over the density of all that was picked [radiance unit x sr x unit²].
     pub fn arriving(&self, number: u64, tally: &mut Tally) -> Option<(SurfacePoint, Vec3, Rgb)> {
-        let (at, weight, u) = self.point(number);
+        let (at, weight, u) = self.point(number)?;
         let (arrival, open) = self.arrival(&at, [u[0], u[1], u[2], u[3]], tally)?;
         if !open {
             tally.rays.shadow += 1;
@@ -204,14 +230,12 @@ impl Filler<'_> {
     }
 
     /// Point number `number` of the surface, flat as the triangle it lies on, area over its density, four numbers for the
-    /// light and one for the depth.
-    pub fn point(&self, number: u64) -> (SurfacePoint, f32, [f32; 5]) {
+    /// light and one for the depth; `None` as [`Receiver::place`].
+    pub fn point(&self, number: u64) -> Option<(SurfacePoint, f32, [f32; 5])> {
         let (pick, u) = self.stream.numbers(number);
         let (pick, weight) = self.density.place(pick);
-        let at = self.body.table.sample(pick, [u[0], u[1]]);
-        let mut point = self.view.scene.objects[self.body.object as usize].mesh.point(at.triangle, at.u, at.v);
-        // Flux through an area is flux through the triangle itself; interpolated normals would not conserve it.
-        point.n = point.n_geometric;
-        (point, weight * self.body.table.area() as f32, [u[2], u[3], u[4], u[5], u[6]])
+        let at = self.body.table().sample(pick, [u[0], u[1]]);
+        let point = self.body.place(&self.view.scene.objects[self.body.object() as usize].mesh, at)?;
+        Some((point, weight * self.body.table().area() as f32, [u[2], u[3], u[4], u[5], u[6]]))
     }
 }

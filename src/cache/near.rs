@@ -1,9 +1,9 @@
 //! Light that enters close to an exit, sampled anew for each exit: for media whose light does not come as far as the next
 //! sample of a cache.
 
-use super::{CachedSample, Columns, Envelope, Filler, Shadow};
+use super::{CachedSample, Columns, Envelope, Filler, Receiver, Shadow};
 use crate::bssrdf::{Exit, Layout, Partition};
-use crate::geometry::SurfacePoint;
+use crate::geometry::{SurfacePoint, Union};
 use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
@@ -81,6 +81,22 @@ struct Line {
     numbers: PixelStream,
     /// The triangle that was found last.
     last: Option<(u32, u32)>,
+    /// The place that was found last on the surface of a union.
+    borne: Option<DVec3>,
+}
+
+impl Line {
+    /// Whether `place`, at `hit`, is a point of the body's surface that was not found yet: of a union not one inside it, and of faces that lie in each
+    /// other one, whichever comes first.
+    fn is_new(&mut self, union: Option<&Union>, hit: &Hit, place: DVec3) -> bool {
+        let Some(union) = union else { return true };
+        if union.hides(hit.triangle, place) {
+            return false;
+        }
+        let again = self.borne.is_some_and(|borne| borne.distance(place) <= union.gap());
+        self.borne = Some(place);
+        !again
+    }
 }
 
 /// Light that may enter at a point.
@@ -211,7 +227,7 @@ impl NearField {
         let half = (self.radius * self.radius - r2).max(0.0).sqrt();
         let reach = half + SLACK_ULPS * (through.abs().max_element() as f32 + half);
         let ray = Ray { t_max: 2.0 * reach, ..Ray::new(through + (along * reach).as_dvec3(), -along) };
-        (half > 0.0).then_some(Line { ray, through, middle: *x, numbers, last: None })
+        (half > 0.0).then_some(Line { ray, through, middle: *x, numbers, last: None, borne: None })
     }
 
     /// What enters where the lines meet the object, all of them at once, surface after surface.
@@ -238,8 +254,9 @@ impl NearField {
                 let square = f64::from(self.radius) * f64::from(self.radius);
                 let near = |place: &DVec3| place.distance_squared(line.middle) <= square;
                 if !again
-                    && hit.mesh == filler.body.object
+                    && hit.mesh == filler.body.object()
                     && let Some(place) = crossing().filter(near)
+                    && line.is_new(filler.body.union.as_deref(), hit, place)
                 {
                     let at = view.outwards(hit);
                     surface += 1;
@@ -314,7 +331,7 @@ impl NearField {
     pub fn step(
         &self,
         view: View<'_>,
-        object: u32,
+        body: &Receiver,
         (from, n): (DVec3, Vec3),
         mut numbers: PixelStream,
         tally: &mut Tally,
@@ -326,18 +343,20 @@ impl NearField {
         let axis = if u * all < AXES[0] { 0 } else { 1 + usize::from(u * all >= AXES[0] + AXES[1]) };
         let mut line = self.line(&middle, axis, numbers)?;
         let square = f64::from(self.radius) * f64::from(self.radius);
-        let mesh = &view.scene.objects[object as usize].mesh;
+        let mesh = &view.scene.objects[body.object() as usize].mesh;
         let mut found = Vec::new();
         for _ in 0..MOST_HITS {
             tally.rays.bounce += 1;
             let Some(hit) = view.rays.closest(&line.ray) else { break };
             line.ray.t_min = hit.t.max(line.ray.t_min.next_up());
             let again = line.last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
-            if again || hit.mesh != object {
+            if again || hit.mesh != body.object() {
                 continue;
             }
             let place = mesh.crossing(hit.triangle, line.through, line.ray.direction.as_dvec3());
-            if let Some(place) = place.filter(|p| p.distance_squared(from) <= square) {
+            if let Some(place) = place.filter(|p| p.distance_squared(from) <= square)
+                && line.is_new(body.union.as_deref(), &hit, place)
+            {
                 found.push((place, hit));
             }
         }

@@ -7,7 +7,6 @@ use super::{
 };
 use crate::bssrdf::{Entry, Exit, Partition};
 use crate::error::Result;
-use crate::geometry::AreaTable;
 use crate::light::Lights;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::Medium;
@@ -90,12 +89,11 @@ const FINEST: f64 = 0.01;
 /// The coarsest cut.
 const COARSEST: f64 = 0.2;
 
-/// The light of one object.
+/// The light of one body of the world.
 pub struct Plan {
     options: SubsurfaceOptions,
-    /// The object.
+    /// The body, by its model.
     pub body: Receiver,
-    medium: Medium,
     envelope: Envelope,
     directions: Directions,
     /// Of even passes and of odd ones.
@@ -114,29 +112,22 @@ impl Plan {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, lights: &Lights, object: u32, options: SubsurfaceOptions) -> Result<Option<Self>> {
-        let mesh = &scene.objects[object as usize].mesh;
-        let (Some(t), Some(table)) = (&scene.surface(object).inside, AreaTable::new(mesh)) else {
-            return Ok(None);
-        };
-        let model = t.build()?;
-        let envelope = Envelope::new(&*model, &t.medium);
+        let (Some(t), Some(_)) = (&scene.surface(object).inside, scene.body(object)) else { return Ok(None) };
+        let Some(body) = Receiver::new(scene, object, t.build()?) else { return Ok(None) };
+        let envelope = Envelope::new(&*body.model, &t.medium);
         let streams = Turn::seeds(options.seed).map(|seed| CacheStream::new(options.points, seed, object.into()));
         let directions = match options.entry {
-            EntrySampling::Light => {
-                Directions::Lights { cosine_share: mesh.bounds().map_or(0.0, |bounds| lights.cosine_share(bounds)) }
-            }
+            EntrySampling::Light => Directions::Lights { cosine_share: lights.cosine_share(body.body.bounds) },
             EntrySampling::Cosine => Directions::Cosine,
         };
-        let (near, samples) = near_field(&envelope, table.area(), &options);
-        let body = Receiver { object, table, model, eta: t.medium.eta };
+        let (near, samples) = near_field(&envelope, body.table().area(), &options);
         let (survey, balance) = (OnceLock::new(), OnceLock::new());
-        let medium = t.medium;
-        Ok(Some(Self { options, body, medium, envelope, directions, streams, near, samples, survey, balance }))
+        Ok(Some(Self { options, body, envelope, directions, streams, near, samples, survey, balance }))
     }
 
     /// The object's medium.
     pub fn medium(&self) -> &Medium {
-        &self.medium
+        &self.body.body.medium
     }
 
     /// What samples this object, by the numbers of `stream`.
@@ -159,7 +150,7 @@ impl Plan {
             if blind || seen.is_empty() {
                 return Survey::none();
             }
-            let stream = CacheStream::new(self.options.points, !self.options.seed, self.body.object.into());
+            let stream = CacheStream::new(self.options.points, !self.options.seed, self.body.object().into());
             let even = Density::even();
             let filler = self.filler(view, lights, &stream, &even);
             Survey::new(&filler, &self.envelope, seen, self.options.spread, self.samples)

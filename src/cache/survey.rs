@@ -50,7 +50,7 @@ impl Survey {
         let bins = (count / PASS_PER_PILOT / PILOTS_PER_BIN).clamp(8, BINS);
         let attempted = bins * PILOTS_PER_BIN;
         let pilots = filler.pilots(attempted);
-        let local = |s: &Seen| ((s.x - filler.body.table.centre()).as_vec3(), s.spread2);
+        let local = |s: &Seen| ((s.x - filler.body.table().centre()).as_vec3(), s.spread2);
         let seen: Vec<(Vec3, f32)> = seen.iter().map(local).collect();
         let sums: Vec<Vec4> = seen.iter().map(|s| pilots.iter().map(|(_, p)| share(envelope, s, p)).sum()).collect();
         let mean = sums.iter().sum::<Vec4>() / sums.len().max(1) as f32;

@@ -120,6 +120,9 @@ fn tell(scene: &Scene, object: &Object, share: f64) {
     let in_mm = mm.map_or(String::new(), |mm| format!(" ({} mm)", lengths(size.map(|s| s * mm), " x ")));
     let triangles = counted(object.mesh.triangles.len(), "triangle", "triangles");
     println!("  {}: {triangles}, {} units{in_mm}", object.name, lengths(size, " x "));
+    if let [_, _, ..] = &object.parts[..] {
+        println!("    one body of {}", object.parts.join(", "));
+    }
     println!(
         "    from ({}) to ({}); {}",
         lengths(bounds[0], ", "),
@@ -261,6 +264,7 @@ fn object_json(scene: &Scene, object: &Object, share: f64) -> Value {
     let (material, Extent { area, size, bounds }) = (&scene.materials[object.material], Extent::new(scene, object));
     json!({
         "name": object.name,
+        "made_of": object.parts,
         "triangles": object.mesh.triangles.len(),
         "area": area,
         "size": size,

@@ -8,6 +8,7 @@ use marmor::math::Rgb;
 use marmor::query::Backend;
 use marmor::scene::{Geometry, Surface};
 use serde::Serialize;
+use std::collections::HashSet;
 
 /// By what takes it [bytes].
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -78,15 +79,17 @@ pub fn of(prepared: &Prepared, window: Window, view: Option<View<'_>>) -> Need {
     };
     // Beside all meshes; a file that is read has its own place already.
     let looks_inside = matches!(prepared.method, Method::Subsurface(_) | Method::VolumePath(_));
-    let loading = prepared.file.objects.iter().zip(&scene.objects).map(|(entry, o)| {
+    let entries = prepared.file.objects.iter().filter(|entry| matches!(entry.geometry, Geometry::Mesh(_)));
+    let from_files: HashSet<&str> = entries.map(|entry| entry.name.as_str()).collect();
+    let loading = scene.objects.iter().map(|o| {
         let (mesh, faces) = (&o.mesh, triangles(o));
-        let read = match &entry.geometry {
-            Geometry::Mesh(_) => {
+        let read = match o.parts.iter().any(|name| from_files.contains(name.as_str())) {
+            true => {
                 let normals = if mesh.normals.is_some() { READING[2] } else { 0 };
                 (faces * (READING[0] + normals) + mesh.positions.len() as u64 * READING[1])
                     .saturating_sub(mesh.bytes() as u64)
             }
-            _ => 0,
+            false => 0,
         };
         let body = looks_inside && scene.materials[o.material].surface.is_body();
         read.max(faces * if body { LOOKING_INSIDE } else { LOOKING })

@@ -130,6 +130,17 @@ pub fn lying(a: &Solid, b: &Solid, gap: f64) -> Option<Vec<Lying>> {
     all.map(|found| found.concat())
 }
 
+impl Solid {
+    /// Whether two faces may lie in each other or pass through each other: of two parts if they come near each other, of one part if they do.
+    pub(super) fn may_meet(&self, i: u32, j: u32, gap: f64) -> bool {
+        let (one, two) = (&self.faces[i as usize], &self.faces[j as usize]);
+        if one.part == two.part {
+            return meet((self, i), (self, j), gap, Seek::Crossing).is_some();
+        }
+        one.bounds().is_near(&two.bounds(), gap)
+    }
+}
+
 /// How two faces meet.
 fn meet((a, i): (&Solid, u32), (b, j): (&Solid, u32), gap: f64, seek: Seek) -> Option<(Kind, DVec3)> {
     let (one, two) = (&a.faces[i as usize], &b.faces[j as usize]);

@@ -49,7 +49,7 @@ impl Findings {
 /// Looks at the mesh as it is rendered.
 pub fn examine(mesh: &Mesh) -> Findings {
     let point = |i: u32| mesh.positions[i as usize];
-    let welded = welded(mesh.positions.len(), point);
+    let welded = mesh.places();
     let faces = Faces::new(&mesh.triangles, &welded, &point);
     let mut found = Findings {
         triangles: mesh.triangles.len(),
@@ -125,7 +125,7 @@ impl std::fmt::Display for Mended {
 /// cavity and keeps the direction that most of its faces have, as do parts with a rim. Holes stay open.
 pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
     let point = |i: u32| mesh.positions[i as usize];
-    let mut first_at = welded(mesh.positions.len(), point);
+    let mut first_at = welded(mesh.positions.len(), point, |_| 0);
     let mut faces = Faces::new(&mesh.triangles, &first_at, &point);
     let open: Vec<[u32; 2]> = faces
         .edges()
@@ -164,17 +164,25 @@ pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
     (ObjMesh { triangles, normals, ..mesh }, done)
 }
 
-/// For each vertex the first one at the same place.
-pub(super) fn welded(count: usize, point: impl Fn(u32) -> DVec3) -> Vec<u32> {
+/// For each vertex the first one of its group at the same place.
+pub(super) fn welded(count: usize, point: impl Fn(u32) -> DVec3, group: impl Fn(u32) -> u32) -> Vec<u32> {
     // + 0.0 makes -0 and 0 one place.
-    let mut order: Vec<([u64; 3], u32)> =
-        (0..count as u32).map(|i| (point(i).to_array().map(|x| (x + 0.0).to_bits()), i)).collect();
+    let mut order: Vec<(([u64; 3], u32), u32)> =
+        (0..count as u32).map(|i| ((point(i).to_array().map(|x| (x + 0.0).to_bits()), group(i)), i)).collect();
     order.par_sort_unstable();
     let mut first_at = vec![0; count];
     for group in order.chunk_by(|a, b| a.0 == b.0) {
         group.iter().for_each(|&(_, i)| first_at[i as usize] = group[0].1);
     }
     first_at
+}
+
+impl Mesh {
+    /// For each vertex the first one at the same place, of those that share places with it.
+    pub(super) fn places(&self) -> Vec<u32> {
+        let group = |i: u32| self.groups.get(i as usize).copied().unwrap_or(0);
+        welded(self.positions.len(), |i| self.positions[i as usize], group)
+    }
 }
 
 /// Six times the signed volume over 6, about the first corner so that places far off lose no digits.

@@ -13,6 +13,8 @@ pub struct Mesh {
     pub normals: Option<Normals>,
     /// What rays are traced in, which decides how far from the surface they start.
     pub precision: Precision,
+    /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
+    pub groups: Vec<u32>,
 }
 
 /// The numbers that rays are traced in.

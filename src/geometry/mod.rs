@@ -20,6 +20,7 @@ mod sheet;
 mod solid;
 #[cfg(test)]
 mod test_shapes;
+mod union;
 mod weld;
 mod winding;
 
@@ -39,4 +40,5 @@ pub use obj_mesh::{ObjMesh, ObjNormals};
 pub use shapes::{rectangle, sphere};
 pub use sheet::{Blunted, MITER_LIMIT, NoSheet, Thick, thickened};
 pub use solid::{Part, Seams, Solid};
+pub use union::Union;
 pub use weld::Seam;

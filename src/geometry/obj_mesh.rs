@@ -15,6 +15,8 @@ pub struct ObjMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Normals, where there are any.
     pub normals: Option<ObjNormals>,
+    /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
+    pub groups: Vec<u32>,
     /// What a user should hear of: what the file has besides, and what is odd about its polygons.
     pub remarks: Vec<String>,
 }
@@ -37,6 +39,30 @@ impl ObjMesh {
     /// Triangles that lack normals while others have them.
     pub fn without_normals(&self) -> usize {
         self.normals.as_ref().map_or(0, |n| n.triangles.iter().filter(|t| t.is_none()).count())
+    }
+
+    /// All of these as one mesh, each with whether it is closed. Closed ones keep their corners for themselves: where they touch, faces of two
+    /// parts lie in each other. Open ones hang together where their corners are at exactly one place, as two half shells do at their rim.
+    pub fn joined(parts: Vec<(Self, bool)>) -> Self {
+        let mut all = Self::default();
+        let shaded = parts.iter().any(|(mesh, _)| mesh.normals.is_some());
+        let mut normals = ObjNormals::default();
+        for (number, (mesh, closed)) in (1..).zip(parts) {
+            let (base, first) = (all.positions.len() as u32, normals.vectors.len() as u32);
+            all.groups.extend(vec![if closed { number } else { 0 }; mesh.positions.len()]);
+            all.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| base + i)));
+            all.positions.extend(mesh.positions);
+            all.remarks.extend(mesh.remarks);
+            match mesh.normals {
+                Some(own) => {
+                    normals.triangles.extend(own.triangles.iter().map(|t| t.map(|t| t.map(|i| first + i))));
+                    normals.vectors.extend(own.vectors);
+                }
+                None => normals.triangles.resize(all.triangles.len(), None),
+            }
+        }
+        all.normals = shaded.then_some(normals);
+        all
     }
 
     /// Applies `transform`, which must have an inverse. A mirroring map also turns the triangles' winding, so that the outside
@@ -125,6 +151,7 @@ impl ObjMesh {
         let mut mesh = Mesh {
             positions: self.positions.iter().map(|p| *p - centre).collect(),
             triangles: self.triangles.clone(),
+            groups: self.groups.clone(),
             ..Mesh::default()
         };
         mesh.normals = self.normals.as_ref().map(|normals| {

@@ -45,6 +45,7 @@ pub fn sphere(centre: DVec3, radius: f64, rings: u32, segments: u32) -> ObjMesh 
         positions: vectors.iter().map(|n| centre + *n * radius).collect(),
         normals: Some(ObjNormals { triangles: triangles.iter().copied().map(Some).collect(), vectors }),
         triangles,
+        groups: Vec::new(),
         remarks: Vec::new(),
     }
 }

@@ -57,7 +57,7 @@ type Edge = (u32, u32, bool, usize);
 
 impl Surface {
     fn new(mesh: &ObjMesh) -> Result<(Self, Vec<Edge>), NoSheet> {
-        let place = welded(mesh.positions.len(), |i| mesh.positions[i as usize]);
+        let place = welded(mesh.positions.len(), |i| mesh.positions[i as usize], |_| 0);
         let corners = |t: usize| mesh.triangles[t].map(|i| place[i as usize]);
         let whole = |t: &usize| {
             let [a, b, c] = corners(*t);

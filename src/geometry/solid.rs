@@ -2,7 +2,6 @@
 //! Read first: [`Solid`]; `contact.rs` finds where two of them meet, `winding.rs` what is inside.
 
 use super::box_tree::BoxTree;
-use super::doctor::welded;
 use super::{Mesh, morton_code};
 use crate::math::{Aabb, DVec3};
 use rayon::prelude::*;
@@ -79,7 +78,7 @@ impl Solid {
     /// Of the triangles of `mesh`. Vertices at exactly the same place count as one; triangles with two of those left out.
     pub fn new(mesh: &Mesh) -> Self {
         let point = |i: u32| mesh.positions[i as usize];
-        let places = welded(mesh.positions.len(), point);
+        let places = mesh.places();
         let mut keys: Vec<([u32; 3], u32)> = (0_u32..)
             .zip(&mesh.triangles)
             .filter_map(|(i, t)| {

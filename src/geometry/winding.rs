@@ -81,6 +81,19 @@ impl Solid {
         count as f64 / probes.len().max(1) as f64
     }
 
+    /// Whether all of `inner` is inside, where their surfaces do not cross.
+    pub fn holds_all(&self, inner: &Self) -> bool {
+        (0..inner.parts.len()).all(|i| self.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0))
+    }
+
+    /// Whether a part of `inner` is inside, where their surfaces do not cross.
+    pub fn holds(&self, inner: &Self) -> bool {
+        let Some(bounds) = self.bounds() else { return false };
+        inner.parts.iter().enumerate().any(|(i, part)| {
+            part.bounds.is_near(&bounds, 0.0) && self.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0)
+        })
+    }
+
     /// A point of a part that lies in its largest face.
     pub fn point_of(&self, part: usize) -> DVec3 {
         let [a, b, c] = self.faces[self.parts[part].largest as usize].corners;
@@ -132,7 +145,7 @@ fn solid_angle(face: &Face, p: DVec3) -> f64 {
     2.0 * a.dot(b.cross(c)).atan2(below)
 }
 
-fn distance(face: &Face, p: DVec3) -> f64 {
+pub(super) fn distance(face: &Face, p: DVec3) -> f64 {
     let [a, b, c] = face.corners.map(|x| x - p);
     let n = face.scaled_normal().normalize_or_zero();
     let foot = n * a.dot(n);

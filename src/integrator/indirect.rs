@@ -146,9 +146,9 @@ impl Indirect {
         let whole: f64 = sources.iter().flatten().map(flux).sum();
         for level in 1..=self.bounces {
             if level > MOST_ROUNDS {
-                for plan in plans.iter().flatten().filter(|p| sources[p.body.object as usize].is_some()) {
+                for plan in plans.iter().flatten().filter(|p| sources[p.body.object() as usize].is_some()) {
                     tally.walk.walks += 1;
-                    tally.walk.losses.add(plan.body.object, Cause::Endless);
+                    tally.walk.losses.add(plan.body.object(), Cause::Endless);
                 }
                 break;
             }
@@ -210,12 +210,12 @@ impl Round<'_> {
     /// Light that comes over opaque surfaces to the body of `plan`, met last of all bodies.
     fn backwards(&self, plan: &Plan, rows: &mut Rows, tally: &mut Tally) {
         let Some(paths) = &self.of.surfaces else { return };
-        let stream = &self.of.streams[plan.body.object as usize][self.turn.stream];
+        let stream = &self.of.streams[plan.body.object() as usize][self.turn.stream];
         let filler = plan.filler(self.view, self.lights, stream, plan.density());
         let first = u64::from(self.turn.number) * u64::from(self.of.count);
         let key = self.key(plan, 1);
         self.tasks(self.of.count, rows, tally, |i, found| {
-            let (at, weight, u) = filler.point(first + i);
+            let Some((at, weight, u)) = filler.point(first + i) else { return };
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { return };
             found.tally.rays.bounce += 1;
             let Some(hit) = self.view.rays.closest(&ray) else { return };
@@ -237,7 +237,7 @@ impl Round<'_> {
 
     /// Light straight from lights, where the boundary of the body mirrors it, or lets it through unscattered or nearly so.
     fn mirrored(&self, plan: &Plan, rows: &mut Rows, tally: &mut Tally) {
-        let stream = &self.of.streams[plan.body.object as usize][self.turn.stream];
+        let stream = &self.of.streams[plan.body.object() as usize][self.turn.stream];
         let filler = plan.filler(self.view, self.lights, stream, plan.density());
         let first = u64::from(self.turn.number) * u64::from(self.of.count);
         let key = self.key(plan, 2);
@@ -267,7 +267,7 @@ impl Round<'_> {
         rows: &mut Rows,
         tally: &mut Tally,
     ) {
-        let object = plan.body.object as usize;
+        let object = plan.body.object() as usize;
         let key = hash_combine(self.key(plan, 3), level.into());
         let wanted = f64::from(self.of.count) * (flux(&source) / whole).min(1.0);
         if wanted.is_nan() || wanted <= 0.0 {
@@ -285,23 +285,21 @@ impl Round<'_> {
         let mut picks: Vec<(f64, [f32; 7])> = (0..u64::from(count)).map(|i| stream.numbers(first + i)).collect();
         picks.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let mesh = &self.view.scene.objects[object].mesh;
-        let each = PI * plan.body.table.area() as f32 / (f64::from(count) * chance) as f32;
+        let each = PI * plan.body.table().area() as f32 / (f64::from(count) * chance) as f32;
         let chunks: Vec<Found> = picks
             .par_chunks(CHUNK)
             .enumerate()
             .map(|(chunk, picks)| {
                 let mut found = Found::default();
                 let place = |(i, &(pick, u)): (usize, &(f64, [f32; 7]))| {
-                    let at = plan.body.table.sample(pick, [u[0], u[1]]);
-                    let at = mesh.point(at.triangle, at.u, at.v);
-                    let at = SurfacePoint { n: at.n_geometric, ..at };
+                    let at = plan.body.place(mesh, plan.body.table().sample(pick, [u[0], u[1]]))?;
                     let w = cosine_hemisphere(at.n, [u[2], u[3]]);
-                    let exit = Exit { x: (at.x - plan.body.table.centre()).as_vec3(), n: at.n, w };
+                    let exit = Exit { x: (at.x - plan.body.table().centre()).as_vec3(), n: at.n, w };
                     let stream = PixelStream::new(key, (chunk * CHUNK + i) as u64, 0);
-                    (at, GatherPoint { exit, place: at.x, stream })
+                    Some((at, GatherPoint { exit, place: at.x, stream }))
                 };
                 let (places, points): (Vec<SurfacePoint>, Vec<GatherPoint>) =
-                    picks.iter().enumerate().map(place).unzip();
+                    picks.iter().enumerate().filter_map(place).unzip();
                 let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
                 if level == 1 {
                     let around = (self.view, self.lights);
@@ -387,12 +385,12 @@ impl Round<'_> {
     fn goes_on(&self, arrived: &Arrived<'_>, depth: f32, draws: &mut Draws, found: &mut Found) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
         let sample = plan.body.enters(&at, w, (flux, 1.0), depth);
-        found.rows.extend(sample.map(|sample| (plan.body.object, sample)));
+        found.rows.extend(sample.map(|sample| (plan.body.object(), sample)));
         if draws.number() < reflectance(plan.body.eta, w.dot(at.n)) {
             let away = reflect(w, at.n);
             return Some((Ray::new(at.leave(away), away), flux));
         }
-        let walks = self.of.paths.walks(plan.body.object);
+        let walks = self.of.paths.walks(plan.body.object());
         let steps = plan.near.is_some();
         let (step, flux) = match (steps, walks) {
             (true, true) => (draws.number() < 0.5, flux * 2.0),
@@ -416,8 +414,7 @@ impl Round<'_> {
             self.turn.seed,
             u64::from(draws.number().to_bits()) << 32 | u64::from(draws.number().to_bits()),
         );
-        let step =
-            near.step(self.view, plan.body.object, (at.x, at.n), PixelStream::new(key, 0, 0), &mut found.tally)?;
+        let step = near.step(self.view, &plan.body, (at.x, at.n), PixelStream::new(key, 0, 0), &mut found.tally)?;
         let out = SurfacePoint { n: step.at.n_geometric, ..step.at };
         let away = cosine_hemisphere(out.n, draws.pair());
         // The boundary has been passed by the choice not to mirror.
@@ -448,13 +445,13 @@ impl Round<'_> {
     ) -> Option<(Ray, Rgb)> {
         let inside = refract(w, at.n, plan.body.eta)?;
         let from = (at.leave(inside), inside);
-        self.of.paths.unmodelled(self.view, plan.body.object, from, flux, draws, &mut found.tally)
+        self.of.paths.unmodelled(self.view, plan.body.object(), from, flux, draws, &mut found.tally)
     }
 
     /// Seed of what a body's paths of one kind draw in this pass.
     fn key(&self, plan: &Plan, kind: u64) -> u64 {
         let pass = hash_combine(self.turn.seed, self.turn.number.into());
-        hash_combine(hash_combine(pass, plan.body.object.into()), kind)
+        hash_combine(hash_combine(pass, plan.body.object().into()), kind)
     }
 }
 

@@ -111,8 +111,7 @@ impl LocalShape {
             last = hit.t;
         }
         // A closed mesh has another side, if only one that touches another object.
-        let found = &view.scene.objects[self.object as usize].findings;
-        if found.volume.is_some_and(|v| v > 0.0) { first.unwrap_or(last) } else { f32::NAN }
+        if view.scene.body(self.object).is_some_and(|body| body.closed) { first.unwrap_or(last) } else { f32::NAN }
     }
 
     /// Mean curvature around `at` [1/unit]: that of the ball that leaves the tangent plane as far as the surface does on

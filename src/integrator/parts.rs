@@ -40,7 +40,7 @@ impl Part {
 pub(super) fn of_cache(plan: &Plan, name: &str, estimator: Estimator) -> Vec<Part> {
     let megabytes = plan.samples as usize as f64 * size_of::<CachedSample>() as f64 / 1e6;
     let samples = counted(plan.samples, "sample", "samples");
-    let triangles = counted(plan.body.table.len(), "triangle", "triangles");
+    let triangles = counted(plan.body.table().len(), "triangle", "triangles");
     let cache = format!("{samples} a pass ({megabytes:.1} MB), {triangles}");
     let colour = format!("colour of `{name}`");
     vec![

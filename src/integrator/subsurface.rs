@@ -17,7 +17,7 @@ use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{EntrySampling, Object, Scene, View};
+use crate::scene::{Body, EntrySampling, Object, Scene, View};
 use crate::tally::{Clock, Tally};
 use std::sync::{Arc, Once};
 
@@ -57,7 +57,7 @@ impl Subsurface {
         let lights = Lights::new(scene);
         let plan = |object| Ok(Plan::new(scene, &lights, object, options)?.map(Arc::new));
         let plans: Vec<Option<Arc<Plan>>> = objects.map(plan).collect::<Result<_>>()?;
-        let modelled = modelled(scene, &plans, &options);
+        let modelled = modelled(&plans, &options);
         let indirect = goes_on(scene, &modelled, &options).then(|| Indirect::new(scene, &plans, modelled, &options));
         Ok(Self {
             options,
@@ -104,7 +104,7 @@ impl Subsurface {
             let point = |&(_, i): &(usize, usize)| {
                 let (w, hit) = (-rays[i].ray.direction, hits[i].as_ref()?);
                 let at = view.point(hit, -w);
-                let x = (at.x - plan.body.table.centre()).as_vec3();
+                let x = (at.x - plan.body.table().centre()).as_vec3();
                 let exit = Exit { x, n: at.normal_seen_from(w), w };
                 Some(GatherPoint { exit, place: at.x, stream: rays[i].stream })
             };
@@ -151,7 +151,7 @@ impl Subsurface {
             let object = group[0].1.object as usize;
             let (Some(plan), Some(gatherer)) = (&self.plans[object], &pass[object]) else { continue };
             let point = |(_, asked): &(usize, Asked)| {
-                let x = (asked.at.x - plan.body.table.centre()).as_vec3();
+                let x = (asked.at.x - plan.body.table().centre()).as_vec3();
                 let exit = Exit { x, n: asked.at.normal_seen_from(asked.w), w: asked.w };
                 GatherPoint { exit, place: asked.at.x, stream: asked.stream }
             };
@@ -202,11 +202,11 @@ impl Subsurface {
 }
 
 /// How paths meet each body.
-fn modelled(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
+fn modelled(plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
     let of = |plan: &Option<Arc<Plan>>| {
         let plan = plan.as_ref()?;
         let once = options.single && !plan.body.model.claims().first_order;
-        let clear = lets_light_through(scene, plan.body.object, plan.medium());
+        let clear = lets_light_through(&plan.body.body, plan.medium());
         let near = plan.near.as_ref().map(|_| plan.clone());
         Some(Modelled { eta: plan.body.eta, clear, once, near })
     };
@@ -217,10 +217,10 @@ fn modelled(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOpti
 const OPAQUE: f64 = 14.0;
 
 /// Whether light comes straight through a body, by its thickness.
-fn lets_light_through(scene: &Scene, object: u32, medium: &Medium) -> bool {
+fn lets_light_through(body: &Body, medium: &Medium) -> bool {
     let sigma_t = medium.sigma_t();
     let least = f64::from(sigma_t.0.into_iter().fold(f32::INFINITY, f32::min));
-    scene.objects[object as usize].thickness().is_some_and(|thickness| least * thickness < OPAQUE)
+    body.thickness.is_some_and(|thickness| least * thickness < OPAQUE)
 }
 
 /// Dents no deeper than this share of a body are rounding: four corners of a plane face are not in one plane.

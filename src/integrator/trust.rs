@@ -116,7 +116,10 @@ impl Trustworthiness {
     pub fn new(view: View<'_>, shape: &LocalShape, tolerance: f64) -> Option<Self> {
         let object = &view.scene.objects[shape.object as usize];
         let Some(material) = &view.scene.surface(shape.object).inside else { return None };
-        let places = spread(&object.mesh, POINTS);
+        let mut places = spread(&object.mesh, POINTS);
+        if let Some(union) = view.scene.union(shape.object) {
+            places.retain(|&(triangle, u, v)| union.bears(triangle, object.mesh.point(triangle, u, v).x));
+        }
         if places.is_empty() {
             return None;
         }

@@ -1,7 +1,8 @@
 //! Where a model sends out more light than has entered, by its own nature or by the shape it is used on: said before a
 //! render, with the factor and a remedy.
 
-use super::{Object, Translucent};
+use super::Translucent;
+use super::body::Shape;
 use crate::bssrdf::{Bssrdf, Conditions, ModelName, ModelOption, SingleScattering, expected_error};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, Medium};
@@ -19,49 +20,17 @@ const SLAB_FROM: f64 = 2.0;
 /// Why `volume_path` is no remedy for the object; see [`super::Scene::untraceable`].
 type Untraceable<'a> = dyn Fn() -> Option<String> + 'a;
 
-impl Object {
-    /// Way through it along the normal [unit], as of the sheet, rod or ball that it is most like; `None` for a mesh that
-    /// encloses nothing.
-    pub fn thickness(&self) -> Option<f64> {
-        Shape::of(self).map(|shape| shape.thickness)
-    }
-}
-
 /// What is to say of the energy of an object's model; nothing where it is as good as on a plane.
-pub(super) fn of(t: &Translucent, object: &Object, untraceable: &Untraceable<'_>) -> Vec<String> {
+pub(super) fn of(
+    t: &Translucent,
+    (shape, is_sheet): (Option<Shape>, bool),
+    untraceable: &Untraceable<'_>,
+) -> Vec<String> {
     let Ok(model) = t.build() else { return Vec::new() };
-    let shape = Shape::of(object);
-    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &*model, (shape, object.sheet.is_some()), untraceable));
+    let sheet = shape.as_ref().and_then(|shape| too_thin(t, &*model, (shape, is_sheet), untraceable));
     // A thin body is the larger error, and has one remedy.
     let nature = if sheet.is_none() { by_nature(t, &*model, untraceable) } else { None };
     sheet.into_iter().chain(nature).chain(shape.and_then(|shape| other_slab(t, &*model, &shape, untraceable))).collect()
-}
-
-/// The sheet, rod or ball that a closed body is most like, from volume V, area S and the mean M of the curvature over it, all of
-/// the mesh itself: 2V/S is the thickness of a sheet, the radius of a rod, two thirds of the radius of a ball, and 2V/S M
-/// is 0, 1/2, 2/3.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Shape {
-    /// Way through it along the normal \[unit\].
-    pub thickness: f64,
-    /// Mean curvature [1/unit]: 0 of a sheet, 1/2r of a rod, 1/r of a ball.
-    pub curvature: f64,
-}
-
-impl Shape {
-    /// `None` for a mesh that encloses nothing.
-    pub fn of(object: &Object) -> Option<Self> {
-        let found = &object.findings;
-        let (volume, bend) = (found.volume.filter(|v| *v > 0.0)?, found.bend?);
-        let mesh = &object.mesh;
-        let area: f64 = (0..mesh.triangles.len() as u32).map(|t| mesh.area(t)).sum();
-        let shortest = mesh.bounds()?.extent().min_element();
-        let (sheet, curvature) = (2.0 * volume / area, bend / area);
-        // Convex bodies have at most 2/3 [Minkowski].
-        let round = (sheet * curvature).clamp(0.0, 2.0 / 3.0);
-        let thickness = object.sheet.unwrap_or((sheet / (1.0 - round)).min(shortest));
-        thickness.is_finite().then_some(Self { thickness, curvature: round / sheet })
-    }
 }
 
 const CHANNELS: [&str; 3] = ["red", "green", "blue"];
@@ -203,6 +172,7 @@ mod tests {
     use crate::bssrdf::ModelName;
     use crate::geometry::{examine, rectangle, sphere};
     use crate::math::DVec3;
+    use crate::scene::Object;
     use std::f64::consts::PI;
 
     fn object(mesh: &crate::geometry::ObjMesh) -> Object {
@@ -210,6 +180,7 @@ mod tests {
         let findings = examine(&mesh);
         Object {
             name: String::new(),
+            parts: Vec::new(),
             mesh,
             at: String::new(),
             material: 0,
@@ -218,6 +189,10 @@ mod tests {
             priority: 0,
             sheet: None,
         }
+    }
+
+    fn shape(object: &Object) -> Option<Shape> {
+        Shape::of(&object.mesh, &object.findings)
     }
 
     /// Six rectangles, their corners at the same places.
@@ -238,7 +213,7 @@ mod tests {
 
     #[test]
     fn sheets_rods_and_balls_have_their_thickness_and_curvature() {
-        let of = |object: &Object| Shape::of(object).unwrap();
+        let of = |object: &Object| shape(object).unwrap();
         let close = |a: f64, b: f64| (a - b).abs() < 0.03 * b.abs() + 1e-3;
         let ball = of(&object(&sphere(DVec3::ONE, 2.0, 48, 96)));
         assert!(close(ball.thickness, 4.0) && close(ball.curvature, 0.5), "{ball:?}");
@@ -250,7 +225,7 @@ mod tests {
         // ∫ H dA of a box is π times the sum of its edges.
         let found = cuboid([1.0, 2.0, 3.0]).findings;
         assert!((found.bend.unwrap() / (12.0 * PI) - 1.0).abs() < 1e-6, "{found:?}");
-        assert_eq!(Shape::of(&object(&rectangle(DVec3::ZERO, DVec3::X, DVec3::Y))), None);
+        assert_eq!(shape(&object(&rectangle(DVec3::ZERO, DVec3::X, DVec3::Y))), None);
     }
 
     #[test]
@@ -266,17 +241,18 @@ mod tests {
         };
         let (thick, thin) = (cuboid([50.0, 20.0, 50.0]), cuboid([50.0, 0.2, 50.0]));
         for model in [ModelName::STANDARD, ModelName::BETTER, ModelName::BEAM, ModelName::NORMALISED, ModelName::AUTO] {
-            assert_eq!(super::of(&of(model), &thick, &|| None), Vec::<String>::new(), "{model:?}");
-            let said = super::of(&of(model), &thin, &|| None).join("\n");
+            assert_eq!(super::of(&of(model), (shape(&thick), false), &|| None), Vec::<String>::new(), "{model:?}");
+            let said = super::of(&of(model), (shape(&thin), false), &|| None).join("\n");
             assert!(
                 said.contains("model of a half space") && said.contains("0.804 transport mean free paths"),
                 "{said}"
             );
             assert!(said.ends_with("take method `volume_path`"), "{said}");
-            let crossed = super::of(&of(model), &thin, &|| Some("it passes through itself".into())).join("\n");
+            let crossed =
+                super::of(&of(model), (shape(&thin), false), &|| Some("it passes through itself".into())).join("\n");
             assert!(crossed.ends_with("`volume_path` cannot trace it: it passes through itself"));
         }
-        assert!(super::of(&of(ModelName::DIRECTIONAL), &thick, &|| None)[0].contains("1.24 times"));
+        assert!(super::of(&of(ModelName::DIRECTIONAL), (shape(&thick), false), &|| None)[0].contains("1.24 times"));
     }
 
     /// Below and above the range of the table: said from 5 % on, with the model's own total and no remedy that is no better.
@@ -291,7 +267,7 @@ mod tests {
             exit_normalisation: true,
             source: String::new(),
         };
-        let said = |model, eta| super::of(&of(model, 0.01, eta), &thick, &|| None).join("\n");
+        let said = |model, eta| super::of(&of(model, 0.01, eta), (shape(&thick), false), &|| None).join("\n");
         for (model, eta, why) in [
             (ModelName::BETTER, 0.7, "with single scattering beside it, at g = 0 and eta = 0.7"),
             (ModelName::DIRECTIONAL, 1.9, "as published"),
@@ -313,7 +289,7 @@ mod tests {
         {
             let mut t = of(ModelName::DIRECTIONAL, 0.0, 1.3);
             t.medium.g = g;
-            let words = super::of(&t, &thick, &|| None).join("\n");
+            let words = super::of(&t, (shape(&thick), false), &|| None).join("\n");
             assert!(words.ends_with(remedy), "{words}");
         }
     }

@@ -1,19 +1,22 @@
 //! What is inside what, once somebody has asked.
 
 use super::Obstacle;
+use crate::geometry::Union;
 use std::collections::HashMap;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// What is inside what in a scene, once somebody has asked; see [`super::Scene::obstacles`].
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct Insides(pub(super) OnceLock<Found>);
 
 /// What was found.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Found {
     pub obstacles: Vec<Obstacle>,
     pub camera_in: Vec<(u32, u32)>,
     pub nests: Nests,
+    /// For each object whose closed parts meet, what of them is the surface of their union.
+    pub unions: Vec<Option<Arc<Union>>>,
 }
 
 /// Bodies that overlap or touch: which of them is where. One entry in each list for each object.

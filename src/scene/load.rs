@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::file::{FovAxis, SceneFile};
-use super::objects::{Geometry, NormalsChoice, ObjectEntry};
+use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
 use super::values::unit_vector;
 use super::{
@@ -43,10 +43,17 @@ impl Scene {
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
+        let mut placed: Vec<Option<ObjMesh>> = placed.into_iter().map(Some).collect();
         let mut objects = Vec::with_capacity(placed.len());
-        for ((entry, mesh), material) in file.objects.iter().zip(placed).zip(of_objects) {
-            let alone = if entry.normals == NormalsChoice::Smooth { mesh.sharing_no_corner() } else { 0 };
-            let as_placed = mesh;
+        for group in grouped(&file.objects) {
+            let entry = &file.objects[group[0]];
+            let alone = |i: usize| match (&placed[i], file.objects[i].normals) {
+                (Some(mesh), NormalsChoice::Smooth) => mesh.sharing_no_corner(),
+                _ => 0,
+            };
+            let alone = group.iter().map(|&i| alone(i)).sum();
+            let meshes: Vec<ObjMesh> = group.iter().filter_map(|&i| placed[i].take()).collect();
+            let as_placed = one_mesh(meshes, centre);
             let mesh = as_placed.recentred(centre);
             drop(as_placed);
             if let Some(p) = mesh.positions.iter().find(|p| !p.as_vec3().is_finite()) {
@@ -55,16 +62,20 @@ impl Scene {
             }
             let findings = examine(&mesh);
             said.extend(smooths_nothing(entry, alone, &findings, translucent(entry)));
-            let (name, at) = (entry.name.clone(), entry.at.clone());
-            let (flipped, priority, thickness) = (entry.flip, entry.priority, entry.thickness);
-            objects.push(Object { name, mesh, at, material, flipped, findings, priority, sheet: thickness });
+            let parts: Vec<String> = group.iter().map(|&i| file.objects[i].name.clone()).collect();
+            let name = entry.body.as_ref().filter(|_| parts.len() > 1).unwrap_or(&entry.name).clone();
+            let (at, flipped) = (entry.at.clone(), group.iter().any(|&i| file.objects[i].flip));
+            let (material, priority, sheet) = (of_objects[group[0]], entry.priority, entry.thickness);
+            objects.push(Object { name, parts, mesh, at, material, flipped, findings, priority, sheet });
         }
+        let bodies = Self::bodies_of(&objects, &materials);
         let mut scene = Self {
             name: file.path.display().to_string(),
             unit_in_mm: file.unit_in_mm,
             centre,
             camera: camera(file, centre)?,
             objects,
+            bodies,
             materials,
             environment,
             why_double: None,
@@ -74,13 +85,13 @@ impl Scene {
         let traced = file.method.name == Some(MethodName::VolumePath);
         let single = file.method.single != Some(false);
         let walks = |t: &Translucent| traced || single && warnings::no_first_order(t).is_some();
-        let choice = precision::choose(&scene.objects, &scene.materials, walks);
+        let choice = precision::choose(&scene.objects, &scene.bodies, &scene.materials, walks);
         if choice.why_double.is_some() {
             scene.objects.iter_mut().for_each(|o| o.mesh.precision = Precision::Double);
         }
         scene.why_double = choice.why_double;
-        for (entry, object) in file.objects.iter().zip(&scene.objects) {
-            sheets::refuse_folds(entry, object, centre)?;
+        for (group, object) in grouped(&file.objects).iter().zip(&scene.objects) {
+            sheets::refuse_folds(&file.objects[group[0]], object, centre)?;
         }
         // From here on: the gap between two surfaces depends on what rays are traced in.
         said.extend(warnings::of(file, &scene));
@@ -88,13 +99,12 @@ impl Scene {
         let models_or_paths = matches!(method, MethodName::Subsurface | MethodName::VolumePath)
             || method == MethodName::Path && scene.has_clear_bodies();
         for (number, what) in choice.beyond {
-            let entry = &file.objects[number];
             // What encloses nothing is not too thin besides, where that is said.
-            let name = &scene.objects[number].name;
+            let Object { name, at, .. } = &scene.objects[number];
             let sheet = |o: &Obstacle| o.kind == ObstacleKind::Sheet && o.objects.contains(name);
             let said_so = |o: &Obstacle| sheet(o) && o.warning(method).is_some();
             if !models_or_paths || !scene.obstacles().iter().any(said_so) {
-                said.push(format!("{}: object {:?}: {what}", entry.at, entry.name));
+                said.push(format!("{at}: object {name:?}: {what}"));
             }
         }
         if models_or_paths {
@@ -123,6 +133,18 @@ impl Scene {
     pub fn meshes(&self) -> Vec<&Mesh> {
         self.objects.iter().map(|o| &o.mesh).collect()
     }
+}
+
+/// The mesh of a body of several objects, or of one.
+fn one_mesh(mut meshes: Vec<ObjMesh>, centre: DVec3) -> ObjMesh {
+    if meshes.len() == 1 {
+        return meshes.pop().unwrap_or_default();
+    }
+    let closed = |mesh: &ObjMesh| {
+        let found = examine(&mesh.recentred(centre));
+        found.open_edges == 0 && found.mixed_edges == 0
+    };
+    ObjMesh::joined(meshes.into_iter().map(|mesh| (closed(&mesh), mesh)).map(|(closed, mesh)| (mesh, closed)).collect())
 }
 
 /// The objects' meshes in the scene's space, in f64.

@@ -3,6 +3,7 @@
 //! `tree.rs` remembers the lines, `difference.rs` names them), `world.rs` (what the renderer sees),
 //! `load.rs` (the way from one to the other).
 
+mod body;
 mod camera;
 mod difference;
 mod doctor;
@@ -17,6 +18,7 @@ mod obstacle;
 mod obstacles;
 mod options;
 mod precision;
+mod seams;
 mod sheets;
 mod tree;
 mod untraceable;
@@ -25,6 +27,7 @@ mod view;
 mod warnings;
 mod world;
 
+pub use body::Body;
 pub use environment::EnvironmentEntry;
 pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;

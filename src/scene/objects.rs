@@ -28,6 +28,8 @@ pub struct ObjectEntry {
     pub priority: i32,
     /// Its mesh is the middle of a sheet so thick \[unit\], > 0.
     pub thickness: Option<f64>,
+    /// Name of the body that it is part of, where it names one: objects of one body have one material and one priority.
+    pub body: Option<String>,
     /// From its own space into the scene's [unit]; has an inverse.
     pub transform: DAffine3,
     /// File and line, for messages.
@@ -73,8 +75,8 @@ named! {
     Smooth = "smooth"
 }
 
-const COMMON: [&str; 9] =
-    ["name", "mesh", "shape", "material", "normals", "flip", "priority", "thickness", "transform"];
+const COMMON: [&str; 10] =
+    ["name", "mesh", "shape", "material", "normals", "flip", "priority", "body", "thickness", "transform"];
 
 const PRIORITY: &str = "a whole number; the higher one wins where bodies overlap";
 
@@ -87,6 +89,7 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
     let mut out: Vec<ObjectEntry> = Vec::with_capacity(list.len());
     let numbers: HashMap<&str, usize> = materials.iter().zip(0..).map(|(m, i)| (m.name.as_str(), i)).collect();
     let mut taken: HashMap<String, String> = HashMap::with_capacity(list.len());
+    let mut bodies: HashMap<String, usize> = HashMap::new();
     for (i, o) in list.iter().enumerate() {
         let geometry = geometry(o)?;
         let name = o.get("name", "a name in quotes", Node::text)?.map_or_else(|| format!("object {i}"), String::from);
@@ -113,11 +116,29 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
             material,
             normals: named_value(o, "normals")?.unwrap_or(NormalsChoice::Auto),
             flip: switch(o, "flip")?.unwrap_or(false),
+            body: o.get("body", "a name in quotes", |n| n.text().filter(|t| !t.is_empty()))?.map(String::from),
             priority: o.get("priority", PRIORITY, |n| n.integer().and_then(|i| i32::try_from(i).ok()))?.unwrap_or(0),
             thickness,
             transform: transform(o)?,
             at: o.at(),
         });
+        let last = out.len() - 1;
+        if let Some(body) = &out[last].body {
+            let first = *bodies.entry(body.clone()).or_insert(last);
+            is_one_body(o, body, [&out[first], &out[last]], materials)?;
+        }
+    }
+    let numbers: HashMap<&str, usize> = out.iter().zip(0..).map(|(entry, i)| (entry.name.as_str(), i)).collect();
+    for group in grouped(&out).iter().filter(|group| group.len() > 1) {
+        let (o, body) = (&list[group[1]], &out[group[1]].body);
+        let other = body.as_ref().and_then(|body| numbers.get(body.as_str())).map(|i| &out[*i]);
+        if let Some(other) = other.filter(|other| other.body != *body) {
+            let what = format_args!(
+                "{:?} is the name of an object that is not part of it ({}); give the body another name",
+                other.name, other.at
+            );
+            return Err(o.error_at("body", what));
+        }
     }
     Ok(out)
 }
@@ -132,6 +153,65 @@ fn no_inside(object: &str, material: &str) -> String {
         "is that of a sheet of a translucent medium, and {object:?} is of {material:?}, which is none; leave it out, or give the \
          object a material of type \"translucent\""
     )
+}
+
+/// That `last`, read from `o`, can be part of `body`, whose first object is `first`.
+fn is_one_body(
+    o: &Fields<'_>,
+    body: &str,
+    [first, last]: [&ObjectEntry; 2],
+    materials: &[MaterialEntry],
+) -> Result<()> {
+    let (name, material) = (&last.name, |entry: &ObjectEntry| &materials[entry.material]);
+    if !material(last).surface.is_body() {
+        let what = format_args!(
+            "{body:?}: object {name:?} is of material {:?} ({}), behind which there is no medium; leave the key out, or take a \
+             translucent or dielectric material",
+            material(last).name,
+            material(last).at
+        );
+        return Err(o.error_at("body", what));
+    }
+    if first.material != last.material {
+        let what = format_args!(
+            "{body:?} has one medium, but object {:?} is of material {:?} ({}) and object {name:?} of material {:?}; give both \
+             the same material, or each a body of its own",
+            first.name,
+            material(first).name,
+            first.at,
+            material(last).name
+        );
+        return Err(o.error_at("body", what));
+    }
+    if let Some(sheet) = [first, last].into_iter().find(|entry| entry.thickness.is_some()) {
+        let what = format_args!(
+            "{body:?}: object {:?} ({}) has a `thickness`: a sheet is a body by itself; leave out one of the two keys",
+            sheet.name, sheet.at
+        );
+        return Err(o.error_at("body", what));
+    }
+    if first.priority != last.priority {
+        let what = format_args!(
+            "{body:?} has one priority, but that of object {:?} is {} ({}) and that of object {name:?} is {}; give both the same",
+            first.name, first.priority, first.at, last.priority
+        );
+        return Err(o.error_at("body", what));
+    }
+    Ok(())
+}
+
+/// The objects that are one in the world: those of one body, and each other one by itself; in the order of the first of each.
+pub(super) fn grouped(objects: &[ObjectEntry]) -> Vec<Vec<usize>> {
+    let (mut out, mut number): (Vec<Vec<usize>>, HashMap<&str, usize>) = (Vec::new(), HashMap::new());
+    for (i, entry) in objects.iter().enumerate() {
+        let next = out.len();
+        let place = entry.body.as_deref().map_or(next, |body| *number.entry(body).or_insert(next));
+        if place == next {
+            out.push(Vec::new());
+        }
+        out[place].push(i);
+    }
+    out
 }
 
 fn geometry(o: &Fields<'_>) -> Result<Geometry> {

@@ -62,6 +62,9 @@ pub struct Obstacle {
     /// Whether no medium of it scatters.
     #[serde(skip)]
     pub(super) clear: bool,
+    /// Whether these are closed parts of one body, of which every method takes the union.
+    #[serde(skip)]
+    pub(super) united: bool,
 }
 
 impl Obstacle {
@@ -101,7 +104,7 @@ impl Obstacle {
             },
             (_, OpaqueTouching) => "light may pass there from one side to the other",
             (_, Unknown) => "what is inside is not known there",
-            _ if self.said => return None,
+            _ if self.said || self.united => return None,
             (MethodName::VolumePath, Hidden) => "nothing of it is seen",
             (MethodName::VolumePath, Blemish) => "paths that come there are lost, and counted",
             (MethodName::VolumePath, _) | (_, Blemish) => return None,

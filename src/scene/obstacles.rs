@@ -2,11 +2,13 @@
 //! and cameras in media. Read first: [`Obstacle`] and [`Found::new`]; docs/robustness.md has the table.
 
 use super::insides::{Found, Nests, Partner};
+use super::seams::{MOSTLY_HOLES, seams};
 use super::{Object, Obstacle, ObstacleKind, Scene};
-use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, lying, meeting, mended};
+use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, Union, lying, meeting, mended};
 use crate::math::{Aabb, DVec3};
 use crate::words::{self, counted, either, percent};
 use std::collections::HashSet;
+use std::sync::Arc;
 
 /// Surfaces closer than this many of the distances that rays start away from a surface are as good as in one place.
 const OFFSETS: f64 = 2.0;
@@ -17,8 +19,6 @@ const LEAST_GAP: f64 = 1e-12;
 const MINOR: f64 = 1e-3;
 /// Less than this is not said beforehand: what is lost there is counted.
 const LEAST: f64 = 1e-4;
-/// A mesh of which more than this share is holes has no inside.
-const MOSTLY_HOLES: f64 = 0.05;
 
 /// After so many pairs of objects that meet, only those are looked at of which one has not met any yet: in a heap of thousands every pair
 /// may.
@@ -35,14 +35,21 @@ impl Scene {
         &self.insides.0.get_or_init(|| Found::new(self)).camera_in
     }
 
+    /// What bounds the body of object number `object`, where its parts overlap, touch or lie in one another; `None` where all of its surface does, and
+    /// where some part is open.
+    pub fn union(&self, object: u32) -> Option<&Arc<Union>> {
+        let unions = &self.insides.0.get_or_init(|| Found::new(self)).unions;
+        unions.get(object as usize)?.as_ref()
+    }
+
     /// Which body is where bodies overlap or touch.
     pub fn nests(&self) -> &Nests {
         &self.insides.0.get_or_init(|| Found::new(self)).nests
     }
 }
 
-/// An object with its solid.
-struct Body<'a> {
+/// An object with its solid: what is looked at.
+struct Shell<'a> {
     index: u32,
     object: &'a Object,
     kind: Role,
@@ -91,11 +98,11 @@ impl Found {
             }
         }
         pairs.sort_unstable();
-        let bodies: Vec<Option<Body<'_>>> = all
+        let bodies: Vec<Option<Shell<'_>>> = all
             .into_iter()
             .zip(wanted)
             .map(|((index, object, kind, bounds), wanted)| {
-                wanted.then(|| Body { index, object, kind, solid: Solid::new(&object.mesh), bounds, share })
+                wanted.then(|| Shell { index, object, kind, solid: Solid::new(&object.mesh), bounds, share })
             })
             .collect();
         let nests = Nests { meets: vec![false; scene.objects.len()], ..ranks(scene, &bodies) };
@@ -104,7 +111,12 @@ impl Found {
             let before = found.obstacles.len();
             let solid = alone(scene, body, &mut found.obstacles);
             found.look_from(scene, body, solid);
-            found.nests.meets[body.index as usize] = found.obstacles[before..].iter().any(|o| o.overlaps());
+            let own = &mut found.obstacles[before..];
+            found.nests.meets[body.index as usize] = own.iter().any(|o| o.overlaps());
+            // As paths would have it: not where some look inwards with nothing around them.
+            if body.solid.parts.iter().all(|p| p.closed) && own.iter().all(|o| o.refusal().is_none()) {
+                own.iter_mut().for_each(|o| o.united = o.overlaps());
+            }
         }
         let (mut meet, mut meets) = (0, vec![false; bodies.len()]);
         for (i, j) in pairs {
@@ -132,11 +144,19 @@ impl Found {
             .obstacles
             .iter_mut()
             .for_each(|o| o.clear = !o.objects.iter().any(|name| scatters.contains(name.as_str())));
+        found.unions.resize_with(scene.objects.len(), || None);
+        for body in bodies.into_iter().flatten() {
+            let united = |o: &Obstacle| o.united && o.objects[0] == body.object.name;
+            if found.obstacles.iter().any(united) {
+                let (gap, count) = (gap(share, &body.bounds, &body.bounds), body.object.mesh.triangles.len());
+                found.unions[body.index as usize] = Some(Arc::new(Union::new(body.solid, count, gap)));
+            }
+        }
         found
     }
 
     /// Two bodies that meet, or one that meets itself: which of their faces lie in each other.
-    fn join(&mut self, a: &Body<'_>, b: &Body<'_>) {
+    fn join(&mut self, a: &Shell<'_>, b: &Shell<'_>) {
         let gap = gap(a.share, &a.bounds, &b.bounds);
         let nests = &mut self.nests;
         (nests.meets[a.index as usize], nests.meets[b.index as usize]) = (true, true);
@@ -151,7 +171,7 @@ impl Found {
     }
 
     /// Whether the camera is in a body.
-    fn look_from(&mut self, scene: &Scene, body: &Body<'_>, solid: bool) {
+    fn look_from(&mut self, scene: &Scene, body: &Shell<'_>, solid: bool) {
         let camera = scene.camera.origin;
         let gap = gap(body.share, &body.bounds, &Aabb::around([camera]));
         let obstacle = |kind, what: String, remedy: String| Obstacle {
@@ -162,6 +182,7 @@ impl Found {
             remedy,
             said: false,
             clear: false,
+            united: false,
         };
         let name = &body.object.name;
         if body.solid.is_near(camera, gap) {
@@ -180,7 +201,7 @@ impl Found {
 }
 
 /// The order of bodies; no contacts yet.
-fn ranks(scene: &Scene, bodies: &[Option<Body<'_>>]) -> Nests {
+fn ranks(scene: &Scene, bodies: &[Option<Shell<'_>>]) -> Nests {
     let media = bodies.iter().flatten().filter(|b| b.kind == Role::Medium);
     let mut order: Vec<(i32, f64, u32)> =
         media.map(|b| (b.object.priority, -b.object.mesh.volume(), b.index)).collect();
@@ -206,7 +227,7 @@ const TURN: &str = "set flip = true, or --repair turns them";
 const TURN_BACK: &str = "leave out flip = true, or --repair turns them";
 
 /// What is wrong with one medium's mesh by itself; whether it has an inside.
-fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
+fn alone(scene: &Scene, body: &Shell<'_>, out: &mut Vec<Obstacle>) -> bool {
     let (solid, name) = (&body.solid, &body.object.name);
     let gap = gap(body.share, &body.bounds, &body.bounds);
     let mut say = |kind, what: String, remedy: &str| {
@@ -220,6 +241,7 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
                 ObstacleKind::Turned => body.object.findings.inside_out(),
                 _ => false,
             },
+            united: false,
             what: format!("object {name:?}: {what}"),
             clear: false,
             remedy: if remedy == TURN && body.object.flipped { TURN_BACK.into() } else { remedy.into() },
@@ -238,7 +260,9 @@ fn alone(scene: &Scene, body: &Body<'_>, out: &mut Vec<Obstacle>) -> bool {
     }
     seams(solid, gap, &mut say);
     if !solid.is_convex(gap) {
-        meets_itself(scene, solid, gap, &mut say);
+        // Of parts that were declared each counts, however small.
+        let minor = if body.object.parts.len() > 1 { 0.0 } else { MINOR };
+        meets_itself(scene, solid, (gap, minor), &mut say);
     }
     solid.seams.hole_share <= MOSTLY_HOLES
 }
@@ -249,50 +273,16 @@ fn welded(mesh: &Mesh) -> Mesh {
     mended(ObjMesh { positions, triangles, ..ObjMesh::default() }).0.recentred(DVec3::ZERO)
 }
 
-/// Edges that leave open what is inside.
-fn seams(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
-    let seams = &solid.seams;
-    if seams.repeated > 0 {
-        let what = counted(seams.repeated, "triangle repeats another", "triangles repeat another");
-        say(ObstacleKind::Faces, what, "--repair removes what is there twice");
-    }
-    if seams.mixed > 0 {
-        let what = format!("faces disagree about the outside along {}", counted(seams.mixed, "edge", "edges"));
-        say(ObstacleKind::Faces, what, "--repair turns them");
-    }
-    if seams.walls > 0 {
-        let what = format!(
-            "{} to three triangles or more, as walls inside a body or fins on it have them",
-            counted(seams.walls, "edge belongs", "edges belong")
-        );
-        say(ObstacleKind::Walls, what, "remove the faces between the parts");
-    }
-    let (share, edges) = (percent(seams.hole_share), seams.open);
-    if seams.hole_share > MOSTLY_HOLES {
-        let what = format!(
-            "an open sheet has no inside ({} to one triangle alone; the openings are {share} of its surface)",
-            counted(edges, "edge belongs", "edges belong")
-        );
-        say(
-            ObstacleKind::Sheet,
-            what,
-            "give it a thickness (the key of the object), or close the openings of a solid body",
-        );
-    } else if edges > 0 {
-        let what = counted(edges, "edge is the rim of a hole", "edges are rims of holes");
-        say(ObstacleKind::Holes, format!("{what}, {share} of its surface"), "close them");
-    }
-    if solid.parts.iter().any(|p| p.closed && p.volume.abs() <= gap * p.area && p.area > 0.0) {
-        let what = format!("a closed part encloses nothing (thinner than {:.1e} units)", 2.0 * gap);
-        say(ObstacleKind::Sheet, what, "give it a thickness");
-    }
-}
-
 /// Parts in one another, and a part that passes through itself.
-fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+fn meets_itself(
+    scene: &Scene,
+    solid: &Solid,
+    (gap, minor): (f64, f64),
+    say: &mut impl FnMut(ObstacleKind, String, &str),
+) {
     let parts = &solid.parts;
     let area: f64 = parts.iter().map(|p| p.area).sum();
-    let large = |i: u32| parts[i as usize].area > MINOR * area;
+    let large = |i: u32| parts[i as usize].area > minor * area;
     let found = meeting(solid, solid, gap, Seek::Crossing, |[a, b]| a != b && large(a) && large(b));
     let all = parts.len();
     let union = "make one surface of them (a union), or cut one out of the other";
@@ -312,7 +302,7 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
         let what = format!("too many faces of its {all} parts are in one place to look at all");
         say(ObstacleKind::Unknown, what, "");
     }
-    parts_in_parts(solid, gap, say);
+    parts_in_parts(solid, (gap, minor), say);
     if let Some(c) = &found.minor {
         let share = solid.hidden_share().max(found.minor_area / area);
         if share < LEAST {
@@ -333,7 +323,7 @@ fn meets_itself(scene: &Scene, solid: &Solid, gap: f64, say: &mut impl FnMut(Obs
 }
 
 /// Parts inside others: right as cavities, and as bodies in cavities.
-fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, String, &str)) {
+fn parts_in_parts(solid: &Solid, (gap, minor): (f64, f64), say: &mut impl FnMut(ObstacleKind, String, &str)) {
     let parts = &solid.parts;
     let area: f64 = parts.iter().map(|p| p.area).sum();
     let [mut nested, mut open, mut turned] = [(0_usize, 0.0); 3];
@@ -373,7 +363,7 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
         ),
     ];
     for (kind, (count, part), [one, many]) in inside {
-        let kind = if part > MINOR * area { kind } else { ObstacleKind::Blemish };
+        let kind = if part > minor * area { kind } else { ObstacleKind::Blemish };
         if count > 0 {
             say(kind, format!("{count} of its {all} parts {}", either(count, one, many)), cavity);
         }
@@ -390,12 +380,12 @@ fn parts_in_parts(solid: &Solid, gap: f64, say: &mut impl FnMut(ObstacleKind, St
 }
 
 /// What is wrong with a medium `a` and another object.
-fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obstacle> {
+fn pair(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>, nests: &Nests) -> Option<Obstacle> {
     let gap = gap(a.share, &a.bounds, &b.bounds);
     let (one, other) = (&a.object.name, &b.object.name);
     let obstacle = |kind, what: String, remedy: String| {
         let (objects, at) = (vec![one.clone(), other.clone()], b.object.at.clone());
-        Some(Obstacle { kind, objects, at, what, remedy, said: false, clear: false })
+        Some(Obstacle { kind, objects, at, what, remedy, said: false, clear: false, united: false })
     };
     let seek = if b.kind == Role::Opaque { Seek::Touching } else { Seek::Crossing };
     let found = meeting(&a.solid, &b.solid, gap, seek, |_| true);
@@ -419,7 +409,7 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
             }
             let how = if found.crossing.is_some() {
                 "partly inside"
-            } else if holds(&a.solid, &b.solid) {
+            } else if a.solid.holds(&b.solid) {
                 "inside"
             } else {
                 return None;
@@ -446,7 +436,7 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
                 let remedy = format!("{apart}, or join them into one mesh without the faces between");
                 return obstacle(ObstacleKind::Touching, what, remedy);
             }
-            let (outer, inner) = match (holds(&a.solid, &b.solid), holds(&b.solid, &a.solid)) {
+            let (outer, inner) = match (a.solid.holds(&b.solid), b.solid.holds(&a.solid)) {
                 (true, _) => (a, b),
                 (_, true) => (b, a),
                 _ if found.unfinished => {
@@ -462,7 +452,7 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
             let what =
                 format!("{} {one:?} and {other:?} overlap: {inside:?} lies inside {outside:?}", kinds(scene, a, b));
             let hidden = nests.rank[inner.index as usize] < nests.rank[outer.index as usize];
-            if hidden && bodies_in(&inner.solid, &outer.solid) {
+            if hidden && outer.solid.holds_all(&inner.solid) {
                 let remedy = format!("give {inside:?} a priority above {}", outer.object.priority);
                 return obstacle(ObstacleKind::Hidden, what, remedy);
             }
@@ -472,20 +462,7 @@ fn pair(scene: &Scene, a: &Body<'_>, b: &Body<'_>, nests: &Nests) -> Option<Obst
 }
 
 /// What two bodies are.
-fn kinds(scene: &Scene, a: &Body<'_>, b: &Body<'_>) -> &'static str {
-    let translucent = |body: &Body<'_>| scene.surface(body.index).is_translucent();
+fn kinds(scene: &Scene, a: &Shell<'_>, b: &Shell<'_>) -> &'static str {
+    let translucent = |body: &Shell<'_>| scene.surface(body.index).is_translucent();
     if translucent(a) && translucent(b) { "the translucent objects" } else { "the bodies" }
-}
-
-/// Whether all of `inner` is inside `outer`, where their surfaces do not cross.
-fn bodies_in(inner: &Solid, outer: &Solid) -> bool {
-    (0..inner.parts.len()).all(|i| outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0))
-}
-
-/// Whether a part of `inner` is inside `outer`, where their surfaces do not cross.
-fn holds(outer: &Solid, inner: &Solid) -> bool {
-    let Some(bounds) = outer.bounds() else { return false };
-    inner.parts.iter().enumerate().any(|(i, part)| {
-        part.bounds.is_near(&bounds, 0.0) && outer.winding(inner.point_of(i), |_| true).is_some_and(|w| w != 0)
-    })
 }

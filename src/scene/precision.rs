@@ -3,11 +3,12 @@
 //! stands. Decided from the meshes and media alone, before anything is built over them.
 
 use super::doctor::COARSE;
-use super::{Material, Object, Surface, Translucent};
-use crate::geometry::{AreaTable, Mesh, Precision};
+use super::{Body, Material, Object, Surface, Translucent};
+use crate::geometry::{Mesh, Precision};
 use crate::math::{Aabb, DVec3};
 use crate::words::{percent, short};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The start of a ray may be off by this share of a body's thickness. On the slab of van de Hulst its reflectance falls by 1.5
 /// times that: see docs/rays.md.
@@ -34,8 +35,13 @@ pub(super) struct Choice {
     pub beyond: Vec<(usize, String)>,
 }
 
-/// For surfaces of these materials; `walks` says in which media paths are followed from collision to collision.
-pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(&Translucent) -> bool) -> Choice {
+/// For surfaces of these materials and their bodies; `walks` says in which media paths are followed from collision to collision.
+pub(super) fn choose(
+    objects: &[Object],
+    bodies: &[Option<Arc<Body>>],
+    materials: &[Material],
+    walks: impl Fn(&Translucent) -> bool,
+) -> Choice {
     let mut choice = Choice { why_double: None, beyond: Vec::new() };
     // What starts rays of its own; lamps do not.
     let offsets: Vec<f64> = objects
@@ -62,12 +68,11 @@ pub(super) fn choose(objects: &[Object], materials: &[Material], walks: impl Fn(
         }
     }
     for (number, object) in objects.iter().enumerate() {
-        let surface = &materials[object.material].surface;
-        let Some(medium_inside) = surface.medium() else { continue };
+        let (surface, Some(body)) = (&materials[object.material].surface, &bodies[number]) else { continue };
         let (other, farthest) = worst.iter().find(|w| w.0 != number).copied().unwrap_or((number, 0.0));
-        let Some(probes) = probes(object, farthest / CONTACT) else { continue };
+        let probes = probes(object, body, farthest / CONTACT);
         let name = &object.name;
-        let (absorbed, sigma) = (medium_inside.sigma_a, medium_inside.sigma_t_prime());
+        let (absorbed, sigma) = (body.medium.sigma_a, body.medium.sigma_t_prime());
         let path = 1.0 / f64::from(sigma.max());
         let decay = (0..3).map(|c| (3.0 * f64::from(absorbed[c]) * f64::from(sigma[c])).sqrt()).fold(0.0, f64::max);
         let limit =
@@ -145,16 +150,15 @@ struct Probe {
     thickness: f64,
 }
 
-/// Points all over an object, with its thickness there as far as that matters, but at least up to `reach`. `None` without area.
-fn probes(object: &Object, reach: f64) -> Option<Vec<Probe>> {
+/// Points all over an object, with its thickness there as far as that matters, but at least up to `reach`.
+fn probes(object: &Object, body: &Body, reach: f64) -> Vec<Probe> {
     let mesh = &object.mesh;
-    let table = AreaTable::new(mesh)?;
     let facing = if object.findings.inside_out() { -1.0 } else { 1.0 };
     let mut probes: Vec<Probe> = (0..POINTS)
         .map(|i| {
             // Points of a two-dimensional golden ratio: even, and the same in each run.
             let u = [0.754_877_666, 0.569_840_291].map(|k: f64| (f64::from(i) * k).fract() as f32);
-            let at = table.sample((f64::from(i) + 0.5) / f64::from(POINTS), u);
+            let at = body.table.sample((f64::from(i) + 0.5) / f64::from(POINTS), u);
             let largest = mesh.corners(at.triangle).map(|p| p.abs().max_element()).into_iter().fold(0.0, f64::max);
             let offset = Precision::Single.error(largest);
             Probe {
@@ -167,12 +171,12 @@ fn probes(object: &Object, reach: f64) -> Option<Vec<Probe>> {
             }
         })
         .collect();
-    let axis = mesh.bounds()?.longest_axis();
+    let axis = body.bounds.longest_axis();
     probes.sort_unstable_by(|a, b| a.x[axis].total_cmp(&b.x[axis]).then(a.triangle.cmp(&b.triangle)));
     let facing = if object.findings.mixed_edges == 0 { Some(facing) } else { None };
     let found = thicknesses(mesh, &probes, axis, facing);
     probes.iter_mut().zip(found).for_each(|(probe, thickness)| probe.thickness = thickness);
-    Some(probes)
+    probes
 }
 
 /// The thickness at each of `probes`, which are in order of `axis`. Only faces that look away count, where it is known which

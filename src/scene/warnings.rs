@@ -18,7 +18,7 @@ pub(super) fn of(file: &SceneFile, scene: &Scene) -> Vec<String> {
     materials(file, scene, &mut said);
     objects(file, scene, &mut said);
     light(file, scene, &mut said);
-    said.extend(shut_in(file, scene));
+    said.extend(shut_in(scene));
     said
 }
 
@@ -96,8 +96,8 @@ fn outside_diffusion(t: &Translucent) -> Option<String> {
 }
 
 fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
-    for ((index, object), entry) in (0..).zip(&scene.objects).zip(&file.objects) {
-        let head = format!("{}: object {:?}", entry.at, entry.name);
+    for (index, object) in (0..).zip(&scene.objects) {
+        let head = format!("{}: object {:?}", object.at, object.name);
         let found = scene.remarks(object).into_iter().filter(|r| r.warns).map(|r| r.text);
         said.extend(found.map(|what| format!("{head}: {what}")));
         if let Some(t) = &scene.materials[object.material].surface.inside
@@ -108,7 +108,9 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
                 said.push(format!("{head}: {what}"));
             } else if models_are_used(file) && !scene.has(object, ObstacleKind::Sheet) {
                 let material = &scene.materials[object.material].name;
-                let found = energy::of(t, object, &|| scene.untraceable(index));
+                let found = energy::of(t, (scene.body(index).and_then(|b| b.shape()), object.sheet.is_some()), &|| {
+                    scene.untraceable(index)
+                });
                 said.extend(found.into_iter().map(|what| format!("{head}: material {material:?}: {what}")));
             }
         }
@@ -140,7 +142,7 @@ fn light(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
 }
 
 /// The camera in a closed body that lets no light in and has no lamp inside.
-fn shut_in(file: &SceneFile, scene: &Scene) -> Option<String> {
+fn shut_in(scene: &Scene) -> Option<String> {
     let (eye, boxes) = (scene.camera.origin, scene.objects.iter().map(|o| o.mesh.bounds()));
     let boxes: Vec<_> = boxes.collect();
     let shines = |o: &super::Object| scene.materials[o.material].surface.shines();
@@ -158,7 +160,7 @@ fn shut_in(file: &SceneFile, scene: &Scene) -> Option<String> {
             && Solid::new(&object.mesh).winding(eye, |_| true).is_some_and(|w| w != 0)
     };
     let i = (0..scene.objects.len()).find(holds_camera)?;
-    let (at, name) = (&file.objects[i].at, &scene.objects[i].name);
+    let (at, name) = (&scene.objects[i].at, &scene.objects[i].name);
     Some(format!(
         "{at}: object {name:?}: the camera is inside it, it is closed and no lamp is in it: all that is seen there is black"
     ))

@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Camera, Environment, Insides, ObstacleKind};
+use super::{Body, Camera, Environment, Insides, ObstacleKind};
 use crate::bssrdf::{Bssrdf, ModelName, ModelOption, ModelOptions, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -22,6 +22,8 @@ pub struct Scene {
     pub camera: Camera,
     /// All surfaces; index = mesh index of a ray backend.
     pub objects: Vec<Object>,
+    /// The bodies of the objects, one for each; `None` where an object bounds none.
+    pub bodies: Vec<Option<Arc<Body>>>,
     /// All materials; objects point into this list.
     pub materials: Vec<Material>,
     /// Light from every direction that meets no surface; black without one.
@@ -34,10 +36,12 @@ pub struct Scene {
     pub insides: Insides,
 }
 
-/// A mesh with a material.
+/// A mesh with a material: an object of the scene file, or several that are one body.
 pub struct Object {
-    /// Name in the scene file.
+    /// Name in the scene file; of several objects, that of their body.
     pub name: String,
+    /// Names of the objects of the scene file that it is made of.
+    pub parts: Vec<String>,
     /// The mesh in scene space.
     pub mesh: Mesh,
     /// Where it stands in the scene file, for messages.
@@ -161,6 +165,16 @@ pub struct Translucent {
 }
 
 impl Scene {
+    /// The bodies of `objects`, for [`Self::bodies`].
+    pub fn bodies_of(objects: &[Object], materials: &[Material]) -> Vec<Option<Arc<Body>>> {
+        let of = |(index, o): (u32, &Object)| {
+            let medium = materials[o.material].surface.medium()?;
+            let body = Body::new(index, &o.parts, medium, &o.mesh, &o.findings)?;
+            Some(Arc::new(Body { thickness: body.thickness.map(|t| o.sheet.unwrap_or(t)), ..body }))
+        };
+        (0..).zip(objects).map(of).collect()
+    }
+
     /// Whether an obstacle of this kind concerns one of [`Self::objects`].
     pub fn has(&self, object: &Object, kind: ObstacleKind) -> bool {
         self.obstacles().iter().any(|o| o.kind == kind && o.objects.contains(&object.name))
@@ -175,6 +189,12 @@ impl Scene {
     pub fn is_dark(&self) -> bool {
         let shines = |o: &Object| self.materials[o.material].surface.shines();
         self.environment.is_black() && !self.objects.iter().any(shines)
+    }
+
+    /// The body behind the surface of an object.
+    #[inline]
+    pub fn body(&self, object: u32) -> Option<&Arc<Body>> {
+        self.bodies[object as usize].as_ref()
     }
 
     /// The surface of an object.

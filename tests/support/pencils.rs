@@ -88,22 +88,26 @@ impl Body {
             exit_normalisation: true,
             source: String::new(),
         };
+        let objects = vec![Object {
+            name: "body".into(),
+            parts: vec!["body".into()],
+            at: String::new(),
+            mesh,
+            material: 0,
+            flipped: false,
+            findings: Findings::default(),
+            priority: 0,
+            sheet: None,
+        }];
+        let materials = vec![Material { name: "body".into(), surface: Surface::translucent(translucent) }];
         let scene = Scene {
             name: "pencil".into(),
             unit_in_mm: None,
             centre: DVec3::ZERO,
             camera,
-            objects: vec![Object {
-                name: "body".into(),
-                at: String::new(),
-                mesh,
-                material: 0,
-                flipped: false,
-                findings: Findings::default(),
-                priority: 0,
-                sheet: None,
-            }],
-            materials: vec![Material { name: "body".into(), surface: Surface::translucent(translucent) }],
+            bodies: Scene::bodies_of(&objects, &materials),
+            objects,
+            materials,
             environment: Rgb::BLACK.into(),
             why_double: None,
             warnings: Vec::new(),

@@ -1,10 +1,10 @@
 //! A path from the camera through the whole scene.
 
 use super::VolumePath;
-use super::body::{Body, Edge, MOST_SURFACES, Straight, Watch, survives};
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_share};
 use super::draws::Draws;
+use super::interior::{Edge, Interior, MOST_SURFACES, Straight, Watch, survives};
 use super::nesting::{self, Entry, Guide, Meets};
 use super::spectrum::Spectrum;
 use super::through::{drawn_light, share_by_chance, sun_share_by_chance};
@@ -48,7 +48,7 @@ pub struct CameraPath<'a> {
     /// was asked for apart.
     pub stepped: bool,
     /// The body that was just left, and how.
-    pub left: Option<(&'a Body, Option<Straight>)>,
+    pub left: Option<(&'a Interior, Option<Straight>)>,
     pub radiance: Rgb,
 }
 
@@ -148,7 +148,7 @@ impl<'a> CameraPath<'a> {
 
     /// Whether small lights are left out that are met by chance alone, and seldom, after light scattered once was reflected inside a
     /// body: white specks, where the first order stands beside a model.
-    fn leaves_specks_out(&self, body: &Body) -> bool {
+    fn leaves_specks_out(&self, body: &Interior) -> bool {
         self.order > 0 && (self.method.once || self.method.modelled[body.object as usize].is_some())
     }
 
@@ -308,7 +308,7 @@ impl<'a> CameraPath<'a> {
 /// A path inside a body: connects to photons, and lets the walk keep its share.
 struct Gather<'a, 'b> {
     path: &'a mut CameraPath<'b>,
-    body: &'a Body,
+    body: &'a Interior,
     /// Whether lamps are asked for.
     lit: bool,
 }
@@ -317,7 +317,7 @@ struct Gather<'a, 'b> {
 struct Nested<'a, 'b>(&'a mut CameraPath<'b>);
 
 impl Guide for Nested<'_, '_> {
-    fn watch<'a>(&'a mut self, body: &'a Body, lit: bool) -> impl Watch + 'a {
+    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl Watch + 'a {
         Gather { path: self.0, body, lit }
     }
 
@@ -436,7 +436,7 @@ pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, directi
 
 /// The normal of both parts. As in `subsurface` what leaves towards the viewer is shaded with the interpolated one, but not
 /// where light refracted by that, at η below 1, would not go through the triangle.
-fn shading_normal(body: &Body, at: &SurfacePoint, direction: Vec3) -> Vec3 {
+fn shading_normal(body: &Interior, at: &SurfacePoint, direction: Vec3) -> Vec3 {
     let n = at.normal_seen_from(-direction);
     let through = |w: Vec3| w.dot(at.n_geometric) < 0.0;
     if refract(-direction, n, body.eta).is_none_or(through) { n } else { at.n_geometric }

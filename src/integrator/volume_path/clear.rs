@@ -1,8 +1,7 @@
 //! Light that comes to a surface only through a clear body: no shadow ray passes a boundary, so paths meet it by chance.
 
 use crate::light::Lights;
-use crate::optics::Medium;
-use crate::scene::{Object, Scene, Surface};
+use crate::scene::{Body, Object, Scene, Surface};
 use crate::words::first_of;
 use std::collections::HashSet;
 use std::f64::consts::PI;
@@ -30,18 +29,18 @@ pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -
     let sun = lights.has_suns()
         && f64::from(lights.solid_angle_of_suns()) < SMALL * PI
         && lights.share_beside_suns() < 1.0 - SUNNY;
-    for (i, body) in scene.objects.iter().enumerate() {
-        let Some(medium) = scene.materials[body.material].surface.medium().filter(|_| passes(i)) else { continue };
-        if !is_clear(&medium, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
+    for (i, body) in scene.bodies.iter().enumerate() {
+        let (Some(body), name) = (body.as_ref().filter(|_| passes(i)), &scene.objects[i].name) else { continue };
+        if !is_clear(body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
             continue;
         }
         if sun {
             keep(0, "the bright part of the environment's picture");
-            keep(1, &body.name);
+            keep(1, name);
         }
         for lamp in scene.objects.iter().filter(|lamp| is_small(scene, lamp, body)) {
             keep(0, &lamp.name);
-            keep(1, &body.name);
+            keep(1, name);
         }
     }
     let [from, through] = kept.map(|names| first_of(&names, MOST_NAMES));
@@ -55,10 +54,10 @@ pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -
 }
 
 /// Whether light goes straight through it in some channel.
-fn is_clear(medium: &Medium, body: &Object) -> bool {
-    let sigma_t = medium.sigma_t();
+fn is_clear(body: &Body) -> bool {
+    let sigma_t = body.medium.sigma_t();
     let least = f64::from(sigma_t.0.into_iter().fold(f32::INFINITY, f32::min));
-    body.thickness().is_some_and(|thickness| least * thickness < CLEAR)
+    body.thickness.is_some_and(|thickness| least * thickness < CLEAR)
 }
 
 /// Whether it shows light that comes to it.
@@ -70,11 +69,11 @@ fn receives(scene: &Scene, object: &Object) -> bool {
 }
 
 /// Whether an object is a lamp that is seldom met from somewhere in `body`: from the corner of its box that is farthest.
-fn is_small(scene: &Scene, lamp: &Object, body: &Object) -> bool {
+fn is_small(scene: &Scene, lamp: &Object, body: &Body) -> bool {
     if !scene.materials[lamp.material].surface.shines() {
         return false;
     }
-    let (Some(own), Some(around)) = (lamp.mesh.bounds(), body.mesh.bounds()) else { return false };
+    let (Some(own), around) = (lamp.mesh.bounds(), body.bounds) else { return false };
     let middle = own.centre();
     let farthest = (around.lower - middle).abs().max((around.upper - middle).abs());
     let area: f64 = (0..lamp.mesh.triangles.len() as u32).map(|t| lamp.mesh.area(t)).sum();

@@ -1,10 +1,10 @@
 //! Joining a path from the camera to photons near it.
 
 use super::Asked;
-use super::body::Body;
 use super::cells::Cells;
 use super::draws::Draws;
 use super::facets::Crossing;
+use super::interior::Interior;
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::Ray;
@@ -48,7 +48,7 @@ pub fn walked_share(cells: &Cells, length: f32, phase: f32) -> f32 {
 /// Whether something lies between is asked for one photon for each channel, drawn by what it carries there.
 pub fn connect(
     view: View<'_>,
-    body: &Body,
+    body: &Interior,
     cells: &Cells,
     (x, w): (DVec3, Vec3),
     scratch: &mut Scratch,

@@ -1,6 +1,6 @@
 //! Where light of lamps and suns enters a body, and how much of it.
 
-use super::body::Body;
+use super::interior::Interior;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::integrator::View;
 use crate::light::{Arrival, Group, LightEnd, Lights, Reference, emitted};
@@ -46,7 +46,7 @@ impl Emission {
     pub fn sample(
         &self,
         view: View<'_>,
-        (body, table): (&Body, &AreaTable),
+        (body, table): (&Interior, &AreaTable),
         lights: &Lights,
         (pick, u): (f64, &[f32; 7]),
         tally: &mut Tally,

@@ -3,12 +3,12 @@
 //! No shadow ray passes a boundary. So lights behind clear bodies are met by paths alone, with all of their light, and lights that
 //! shadow rays meet are met by none of these.
 
-use super::body::{Body, Edge, Watch};
 use super::connect::Scratch;
 use super::draws::Draws;
+use super::interior::{Edge, Interior, Watch};
 use super::nesting::{self, Entry, Guide, Meets, Stack};
 use super::spectrum::Spectrum;
-use super::{VolumePath, body};
+use super::{VolumePath, interior};
 use crate::geometry::SurfacePoint;
 use crate::integrator::{CameraRay, View};
 use crate::math::{DVec3, Rgb, Vec3};
@@ -17,8 +17,8 @@ use crate::scene::Scene;
 use crate::tally::Tally;
 
 /// The clear bodies of `scene`, one entry for each object.
-pub fn clear_bodies(scene: &Scene) -> Vec<Option<Body>> {
-    let of = |i: usize| if scene.surface(i as u32).clear.is_some() { body(scene, i, 1) } else { None };
+pub fn clear_bodies(scene: &Scene) -> Vec<Option<Interior>> {
+    let of = |i: usize| if scene.surface(i as u32).clear.is_some() { interior(scene, i, 1) } else { None };
     (0..scene.objects.len()).map(of).collect()
 }
 
@@ -36,7 +36,7 @@ pub fn camera_in(scene: &Scene) -> Stack {
 struct Passing<'a>(&'a VolumePath);
 
 impl Guide for Passing<'_> {
-    fn watch<'a>(&'a mut self, _: &'a Body, _: bool) -> impl Watch + 'a {
+    fn watch<'a>(&'a mut self, _: &'a Interior, _: bool) -> impl Watch + 'a {
         Ends
     }
 

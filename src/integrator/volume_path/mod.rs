@@ -1,8 +1,7 @@
 //! Paths through a scene and through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach,
 //! and all that is between bodies for the methods that have those models.
-//! Read first: `camera.rs` (a path through the scene), `body.rs` (inside one object), then `connect.rs` (what makes it fast).
+//! Read first: `camera.rs` (a path through the scene), `interior.rs` (inside one body), then `connect.rs` (what makes it fast).
 
-mod body;
 mod camera;
 mod cells;
 #[cfg(test)]
@@ -13,6 +12,7 @@ mod draws;
 mod emission;
 mod facets;
 mod glass;
+mod interior;
 mod modelled;
 #[cfg(test)]
 mod near_checks;
@@ -31,16 +31,16 @@ use crate::math::{Rgb, Vec3};
 use crate::optics::Medium;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
-use crate::scene::{Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
+use crate::scene::{Contacts, Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
 use crate::surface::Lambertian;
 use crate::tally::{Cause, Tally};
 use crate::words::short;
-use body::Body;
-pub use body::MOST_SURFACES;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 pub(super) use connect::Scratch;
 pub(super) use draws::Draws;
+use interior::Interior;
+pub use interior::MOST_SURFACES;
 pub(super) use modelled::Modelled;
 use nesting::{Entry, Stack};
 pub use pencil::Left;
@@ -74,7 +74,7 @@ pub struct VolumePath {
     options: VolumePathOptions,
     light: DirectLight,
     /// One for each object; `None` where it is not translucent.
-    bodies: Vec<Option<Body>>,
+    bodies: Vec<Option<Interior>>,
     throughs: Vec<Option<Through>>,
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps and suns on the body itself, once photons have that.
@@ -124,14 +124,16 @@ impl VolumePath {
             return Err(Error::scene(refusals.join("\n")));
         }
         let lights = Lights::new(scene);
-        let bodies: Vec<Option<Body>> = (0..scene.objects.len()).map(|i| body(scene, i, CLEARANCE_CELLS)).collect();
+        let bodies: Vec<Option<Interior>> =
+            (0..scene.objects.len()).map(|i| interior(scene, i, CLEARANCE_CELLS)).collect();
         let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
         let shines = lights.has_emitters() || lights.has_suns();
-        let source = |body: &Option<Body>| {
+        let source = |body: &Option<Interior>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
             let alone = body.medium.albedo.max() > 0.0 && !body.nested;
-            alone.then(|| Source::new(scene, body, options.photons, reach, options.seed)).flatten()
+            let world = scene.body(body.object).filter(|_| alone)?;
+            Some(Source::new(world, options.photons, reach, options.seed))
         };
         let sources = bodies.iter().map(source).collect();
         let diffuse = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_opaque());
@@ -205,7 +207,7 @@ impl VolumePath {
         ray: &CameraRay,
         scratch: &'a mut Scratch,
         tally: &'a mut Tally,
-        body: &'a Body,
+        body: &'a Interior,
     ) -> Rgb {
         let mut path = self.path(view, pass, ray.stream, scratch, tally);
         let entry = Entry { stack: self.camera_in.clone(), ..Entry::alone(body) };
@@ -267,7 +269,7 @@ impl VolumePath {
     pub(super) fn once(scene: &Scene, wanted: impl Fn(usize) -> bool, seed: u64) -> Self {
         let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
         let surfaces = Self::surfaces(scene, options);
-        let bodies = endless_bodies(scene, wanted);
+        let bodies = endless(scene, wanted);
         Self { throughs: throughs(scene, &surfaces.light.lights, &bodies), bodies, once: true, ..surfaces }
     }
 
@@ -283,12 +285,12 @@ impl VolumePath {
     }
 
     /// How lamps and suns are asked for at collisions in `body`.
-    fn through(&self, body: &Body) -> Option<&Through> {
+    fn through(&self, body: &Interior) -> Option<&Through> {
         self.throughs[body.object as usize].as_ref()
     }
 
     /// Whether a path of [`Self::once`] can find no more light once lamps have been asked for.
-    fn points_are_all(&self, body: &Body) -> bool {
+    fn points_are_all(&self, body: &Interior) -> bool {
         let lamps = || self.through(body).is_some_and(|t| t.all_alone);
         self.once && !self.light.lights.has_environment() && lamps()
     }
@@ -298,21 +300,19 @@ impl VolumePath {
     }
 }
 
-/// The body of object number `index`, where it is one and has a size.
-fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
-    let object = &scene.objects[index];
-    let surface = &scene.materials[object.material].surface;
-    let (medium, bounds) = (surface.medium()?, object.mesh.bounds()?);
-    let clear = surface.clear.as_ref();
+/// What paths need of the body of object number `index`, where it is one.
+fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
+    let (object, body) = (&scene.objects[index], scene.body(index as u32)?);
+    let clear = scene.surface(body.object).clear.as_ref();
     let cells = if clear.is_some() { 1 } else { cells };
     let meshes = scene.objects.iter().map(|o| &o.mesh);
-    let clearance = Clearance::new(meshes, bounds, cells);
-    let body = match clear {
+    let clearance = Clearance::new(meshes, body.bounds, cells);
+    let interior = match clear {
         Some(clear) => {
-            let void = Medium { sigma_a: Rgb::BLACK, ..medium };
-            Body { absorbs: Some(clear.sigma_a), ..Body::new(index as u32, &void, clearance) }
+            let void = Medium { sigma_a: Rgb::BLACK, ..body.medium };
+            Interior { absorbs: Some(clear.sigma_a), ..Interior::new(body.object, &void, clearance) }
         }
-        None => Body::new(index as u32, &medium, clearance),
+        None => Interior::new(body.object, &body.medium, clearance),
     };
     let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
     let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {
@@ -323,19 +323,24 @@ fn body(scene: &Scene, index: usize, cells: u32) -> Option<Body> {
     });
     let leak = leak.unwrap_or(Cause::Rounding);
     let (nests, contacts) = (scene.nests(), scene.nests().contacts[index].clone());
-    Some(Body { leak, nested: clear.is_some() || nests.meets[index], contacts, ..body })
+    Some(Interior { leak, nested: clear.is_some() || nests.meets[index], contacts, ..interior })
 }
 
 /// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault: the models beside know nothing of them either.
-fn endless_bodies(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Body>> {
-    let lone = |body: Body| Body { endless: true, nested: false, ..body };
-    let body = |i| if wanted(i) { body(scene, i, 1).map(lone) } else { None };
-    (0..scene.objects.len()).map(body).collect()
+fn endless(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior>> {
+    let lone = |interior: Interior| {
+        let union = scene.union(interior.object).cloned();
+        // Where its own parts lie in each other is no face of another body.
+        let contacts = if union.is_some() { Contacts::new() } else { interior.contacts };
+        Interior { endless: true, nested: false, union, contacts, ..interior }
+    };
+    let of = |i| if wanted(i) { interior(scene, i, 1).map(lone) } else { None };
+    (0..scene.objects.len()).map(of).collect()
 }
 
 /// How lamps and suns are asked for in each of the bodies that scatter.
-fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Body>]) -> Vec<Option<Through>> {
-    let of = |body: &Option<Body>| {
+fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Interior>]) -> Vec<Option<Through>> {
+    let of = |body: &Option<Interior>| {
         let body = body.as_ref().filter(|body| body.medium.albedo.max() > 0.0)?;
         Through::new(scene, lights, body.object, body.eta, body.phase.g as f32)
     };
@@ -346,7 +351,7 @@ impl Integrator for VolumePath {
     type Pass = Vec<Option<Cells>>;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
-        let fill = |(source, body): (&Option<Source>, &Option<Body>)| {
+        let fill = |(source, body): (&Option<Source>, &Option<Interior>)| {
             let (source, body) = (source.as_ref()?, body.as_ref()?);
             let cells = source.trace(view, body, &self.light.lights, pass, tally)?;
             tally.walk.photons += u64::from(source.count);
@@ -373,7 +378,7 @@ impl Integrator for VolumePath {
     }
 
     fn pass_bytes(&self, view: View<'_>) -> u64 {
-        let of = |(body, source): (&Option<Body>, &Option<Source>)| {
+        let of = |(body, source): (&Option<Interior>, &Option<Source>)| {
             Some(source.as_ref()?.bytes(view, body.as_ref()?, &self.light.lights))
         };
         self.bodies.iter().zip(&self.sources).filter_map(of).sum()

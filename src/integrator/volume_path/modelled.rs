@@ -1,13 +1,13 @@
 //! Paths over bodies whose light a model has: there it is asked for, and only what the model lacks is walked.
 
-use super::body::{Body, Edge, MOST_SURFACES, Watch, survives};
 use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
 use super::draws::Draws;
 use super::glass;
+use super::interior::{Edge, Interior, MOST_SURFACES, Watch, survives};
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
-use super::{Asked, VolumePath, VolumePathOptions, endless_bodies, throughs};
+use super::{Asked, VolumePath, VolumePathOptions, endless, throughs};
 use crate::bssrdf::Exit;
 use crate::cache::{Plan, Step};
 use crate::geometry::SurfacePoint;
@@ -69,9 +69,9 @@ impl VolumePath {
     ) -> Self {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, ..options };
         let surfaces = Self::surfaces(scene, options);
-        let walked = endless_bodies(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
+        let walked = endless(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
         let clear = glass::clear_bodies(scene);
-        let bodies: Vec<Option<Body>> = walked.into_iter().zip(clear).map(|(body, clear)| clear.or(body)).collect();
+        let bodies: Vec<Option<Interior>> = walked.into_iter().zip(clear).map(|(body, clear)| clear.or(body)).collect();
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
         Self { throughs, bodies, modelled, bounces, camera_in: glass::camera_in(scene), ..surfaces }
     }
@@ -164,7 +164,7 @@ impl VolumePath {
     }
 
     /// The body of object number `object`, where paths walk in it.
-    fn body(&self, object: u32) -> Option<&Body> {
+    fn body(&self, object: u32) -> Option<&Interior> {
         self.bodies[object as usize].as_ref()
     }
 }
@@ -269,12 +269,11 @@ impl CameraPath<'_> {
     }
 
     /// Through a body from `at` along `w` without being scattered; the ray on which the path leaves.
-    fn straight(&mut self, body: &Body, at: &SurfacePoint, mut w: Vec3) -> Option<Ray> {
+    fn straight(&mut self, body: &Interior, at: &SurfacePoint, mut w: Vec3) -> Option<Ray> {
         let mut from = at.leave(w);
         for _ in 0..MOST_SURFACES {
             self.tally.rays.bounce += 1;
-            let hit = self.view.rays.closest(&Ray::new(from, w)).filter(|hit| hit.mesh == body.object)?;
-            let at = self.view.outwards(&hit);
+            let (hit, at) = body.closest(self.view, Ray::new(from, w)).filter(|(hit, _)| hit.mesh == body.object)?;
             if at.n_geometric.dot(w) <= 0.0 {
                 return None;
             }
@@ -301,8 +300,7 @@ impl CameraPath<'_> {
         let stream = self.stream.aside(hash_combine(STEP, self.asked.into()));
         self.asked += 1;
         let exit = Exit { x: Vec3::ZERO, n: at.normal_seen_from(w), w };
-        let Step { place, at: entry, weight } =
-            near.step(self.view, plan.body.object, (at.x, exit.n), stream, self.tally)?;
+        let Step { place, at: entry, weight } = near.step(self.view, &plan.body, (at.x, exit.n), stream, self.tally)?;
         let entry = SurfacePoint { n: entry.n_geometric, ..entry };
         let w = cosine_hemisphere(entry.n, self.draws.pair());
         let sample = plan.body.enters(&entry, w, (Rgb::splat(PI), weight), self.draws.number())?;
@@ -321,7 +319,7 @@ impl CameraPath<'_> {
     }
 
     /// Whether light that was scattered as often as the path's is part of the model of `body`.
-    pub fn in_model(&self, body: &Body) -> bool {
+    pub fn in_model(&self, body: &Interior) -> bool {
         self.method.modelled[body.object as usize].is_some() && self.order > 1
     }
 }

@@ -8,8 +8,8 @@
 //!
 //! Faces that lie in each other are crossed at once, by a table: rays could not tell which comes first.
 
-use super::body::{Body, Edge, Exit, MOST_SURFACES, ROULETTE_BELOW, Straight, Watch, survives};
 use super::draws::Draws;
+use super::interior::{Edge, Exit, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, Watch, survives};
 use super::spectrum::Spectrum;
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
@@ -86,7 +86,7 @@ struct Faces {
 
 /// The surfaces that light along `w`, with `stack` around it, meets at `hit`: its own first, then those that lie in it. At the rim of
 /// those rounding decides; there only a body that is around can be left.
-fn faces(view: View<'_>, stack: &Stack, body: &Body, hit: &Hit, at: &SurfacePoint, w: Vec3) -> Faces {
+fn faces(view: View<'_>, stack: &Stack, body: &Interior, hit: &Hit, at: &SurfacePoint, w: Vec3) -> Faces {
     let turn = |n: Vec3| if n.dot(w) < 0.0 { 1 } else { -1 };
     let mut turns = vec![(hit.mesh, turn(at.n_geometric))];
     let Some(partners) = body.contacts.get(&hit.triangle) else { return Faces { turns, margin: 0.0 } };
@@ -129,7 +129,7 @@ fn within(corners: [DVec3; 3], x: DVec3) -> f64 {
 /// A way into bodies from outside all.
 pub struct Entry<'a> {
     /// The body that light comes into.
-    pub body: &'a Body,
+    pub body: &'a Interior,
     /// The bodies around it then; of one that meets no other nothing.
     pub stack: Stack,
     /// Rays start this far away at least [unit].
@@ -140,12 +140,12 @@ pub struct Entry<'a> {
 
 impl<'a> Entry<'a> {
     /// Into a body that meets no other.
-    pub fn alone(body: &'a Body) -> Self {
+    pub fn alone(body: &'a Interior) -> Self {
         Self { body, stack: Stack::default(), margin: 0.0, through: None }
     }
 
     /// Into `body` at `hit` along `w`, and into others whose faces lie there; `None` where rays cannot tell.
-    pub fn at(view: View<'_>, bodies: &'a [Option<Body>], body: &'a Body, hit: &Hit, w: Vec3) -> Option<Self> {
+    pub fn at(view: View<'_>, bodies: &'a [Option<Interior>], body: &'a Interior, hit: &Hit, w: Vec3) -> Option<Self> {
         if !body.nested {
             return Some(Self::alone(body));
         }
@@ -161,7 +161,7 @@ impl<'a> Entry<'a> {
 /// at collisions there.
 pub trait Guide {
     /// For `body`.
-    fn watch<'a>(&'a mut self, body: &'a Body, lit: bool) -> impl Watch + 'a;
+    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl Watch + 'a;
 
     /// How paths meet the body of object number `object`.
     fn meets(&self, object: u32) -> Meets;
@@ -187,8 +187,8 @@ enum Met {
     Lost,
 }
 
-/// As [`Body::flight`], but for any surface.
-fn flight(view: View<'_>, body: &Body, from: DVec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Met {
+/// As [`Interior::flight`], but for any surface.
+fn flight(view: View<'_>, body: &Interior, from: DVec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Met {
     let end = || from + w.as_dvec3() * f64::from(distance);
     if distance < body.clearance.at(from) {
         tally.clear += 1;
@@ -203,16 +203,16 @@ fn flight(view: View<'_>, body: &Body, from: DVec3, w: Vec3, distance: f32, tall
 }
 
 /// Follows light from `from` along `w`, with `stack` around it and the triangle `last` behind it, until it is outside all bodies, and tells the body that it left; `None` where
-/// it is absorbed, ended by a watch, or lost. As [`Body::walk`], from body to body.
+/// it is absorbed, ended by a watch, or lost. As [`Interior::walk`], from body to body.
 pub fn walk<'a>(
     view: View<'_>,
-    bodies: &'a [Option<Body>],
+    bodies: &'a [Option<Interior>],
     ((mut stack, mut last), mut from, mut w): (Around, DVec3, Vec3),
     spectrum: &mut Spectrum,
     draws: &mut Draws,
     guide: &mut impl Guide,
     tally: &mut WalkTally,
-) -> Option<(&'a Body, Exit)> {
+) -> Option<(&'a Interior, Exit)> {
     let nests = view.scene.nests();
     let body_of = |stack: &Stack| bodies[stack.top()? as usize].as_ref();
     let mut body = body_of(&stack)?;
@@ -329,7 +329,7 @@ pub fn walk<'a>(
 const SURFACES_BETWEEN_LOOKS: u32 = 8;
 
 /// Roulette by what is left of the weight that a path came with.
-fn goes_on(body: &Body, whole: f32, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
+fn goes_on(body: &Interior, whole: f32, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
     survives(spectrum.value(&body.medium).max() / whole / ROULETTE_BELOW, spectrum, draws)
 }
 

@@ -1,8 +1,8 @@
 //! One beam into one body and where it comes out: the walk of the renderer alone, for profiles and totals.
 
 use super::VolumePath;
-use super::body::{Edge, Watch};
 use super::draws::Draws;
+use super::interior::{Edge, Watch};
 use super::spectrum::Spectrum;
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};

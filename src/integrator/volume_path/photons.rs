@@ -1,26 +1,25 @@
 //! Light traced from lamps and suns into a body: where it is scattered, for paths from the camera to connect to.
 
-use super::body::{Body, Edge, Watch};
 use super::cells::{Cells, Photon};
 use super::draws::Draws;
 use super::emission::{Emission, Entering};
+use super::interior::{Edge, Interior, Watch};
 use super::spectrum::Spectrum;
-use crate::geometry::AreaTable;
 use crate::integrator::View;
 use crate::light::{Group, Lights, Reference};
 use crate::math::{DVec3, Vec3, hash_combine};
 use crate::optics::refract;
 use crate::sampling::{CacheStream, Points, Turn};
-use crate::scene::Scene;
+use crate::scene::Body;
 use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 /// What one body's photons are made from, pass after pass.
 pub struct Source {
-    /// Points of the body's surface.
-    pub table: AreaTable,
+    /// The body, with points of its surface.
+    pub body: Arc<Body>,
     /// Numbers of the points and of the light that reaches them.
     pub streams: [CacheStream; Turn::STREAMS],
     /// Seed of them and of all other numbers.
@@ -54,28 +53,27 @@ const LEAST_WAY: f32 = 0.02;
 const LEAST_SHARE: f32 = 0.05;
 
 impl Source {
-    /// `None` for a body without area. `count` photons a pass; `reach` [unit].
-    pub fn new(scene: &Scene, body: &Body, count: u32, reach: f32, seed: u64) -> Option<Self> {
-        let table = AreaTable::new(&scene.objects[body.object as usize].mesh)?;
+    /// `count` photons a pass; `reach` [unit].
+    pub fn new(body: &Arc<Body>, count: u32, reach: f32, seed: u64) -> Self {
         let seed = hash_combine(hash_combine(seed, 0x7068_6f74_6f6e), u64::from(body.object));
         let streams = Turn::seeds(seed).map(|seed| CacheStream::new(Points::Sobol, seed, 0));
-        Some(Self { table, streams, seed, count, reach, plan: OnceLock::new() })
+        Self { body: body.clone(), streams, seed, count, reach, plan: OnceLock::new() }
     }
 
-    fn plan(&self, view: View<'_>, body: &Body, lights: &Lights) -> Option<&Plan> {
+    fn plan(&self, view: View<'_>, body: &Interior, lights: &Lights) -> Option<&Plan> {
         self.plan.get_or_init(|| self.look(view, body, lights)).as_ref()
     }
 
     /// By numbers that no photon uses, for shares of connections that depended on the photons would not be fair. Points are
     /// taken to see each other.
-    fn look(&self, view: View<'_>, body: &Body, lights: &Lights) -> Option<Plan> {
+    fn look(&self, view: View<'_>, body: &Interior, lights: &Lights) -> Option<Plan> {
         let pilot = CacheStream::new(Points::Sobol, self.seed, 1);
-        let around = Reference::body(&view.scene.objects[body.object as usize].mesh.bounds()?);
+        let around = Reference::body(&self.body.bounds);
         let flux_by = |emission: Emission| {
             let (mut flux, mut by) = (0.0, [0.0; 3]);
             for i in 0..PILOT {
                 let (pick, u) = pilot.numbers(i);
-                let found = emission.sample(view, (body, &self.table), lights, (pick, &u), &mut Tally::default());
+                let found = emission.sample(view, (body, &self.body.table), lights, (pick, &u), &mut Tally::default());
                 let Some(entering) = found else { continue };
                 let each = entering.flux.mean() / PILOT as f32;
                 flux += each;
@@ -111,7 +109,14 @@ impl Source {
 
     /// The pass's photons, in cells; `None` where no light comes to the body. Which thread traces which photon does not matter: each
     /// is a function of its number.
-    pub fn trace(&self, view: View<'_>, body: &Body, lights: &Lights, pass: u32, tally: &mut Tally) -> Option<Cells> {
+    pub fn trace(
+        &self,
+        view: View<'_>,
+        body: &Interior,
+        lights: &Lights,
+        pass: u32,
+        tally: &mut Tally,
+    ) -> Option<Cells> {
         let plan = self.plan(view, body, lights)?;
         let turn = Turn::of(self.seed, pass);
         let first = u64::from(turn.number) * u64::from(self.count);
@@ -137,7 +142,7 @@ impl Source {
     }
 
     /// Memory of a pass's photons at its most, while they are sorted [bytes], by a few of the first pass.
-    pub fn bytes(&self, view: View<'_>, body: &Body, lights: &Lights) -> u64 {
+    pub fn bytes(&self, view: View<'_>, body: &Interior, lights: &Lights) -> u64 {
         let few = u64::from(self.count).min(SOUNDING);
         let Some(plan) = self.plan(view, body, lights) else { return 0 };
         if few == 0 {
@@ -159,14 +164,14 @@ impl Source {
     fn photon(
         &self,
         view: View<'_>,
-        body: &Body,
+        body: &Interior,
         lights: &Lights,
         (plan, turn, number): (&Plan, Turn, u64),
         photons: &mut Vec<Photon>,
         tally: &mut Tally,
     ) {
         let numbers = self.streams[turn.stream].numbers(number);
-        let found = plan.emission.sample(view, (body, &self.table), lights, (numbers.0, &numbers.1), tally);
+        let found = plan.emission.sample(view, (body, &self.body.table), lights, (numbers.0, &numbers.1), tally);
         let Some(Entering { at, w, flux, light, shadow, .. }) = found else { return };
         let Some(w) = refract(w, at.n, body.eta) else { return };
         if flux.is_black() {
@@ -193,7 +198,7 @@ impl Source {
 
 /// Keeps every collision; far from the surface, where few connections come from, only some, with more weight.
 struct Deposit<'a> {
-    body: &'a Body,
+    body: &'a Interior,
     photons: &'a mut Vec<Photon>,
     reach: f32,
     coins: Draws,

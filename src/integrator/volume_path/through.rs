@@ -1,8 +1,8 @@
 //! Light from a lamp or a sun straight to a collision, through every facet of the boundary that refracts it there.
 
-use super::body::{Body, Straight};
 use super::draws::Draws;
 use super::facets::{Bend, Crossing, Facets, Towards};
+use super::interior::{Interior, Straight};
 use super::spectrum::Spectrum;
 use crate::integrator::View;
 use crate::light::{Group, LightEnd, LightSample, Lights, Reference};
@@ -41,8 +41,7 @@ impl Through {
         if !lights.has_emitters() && !lights.has_suns() {
             return None;
         }
-        let mesh = &scene.objects[object as usize].mesh;
-        let bounds = mesh.bounds()?;
+        let (mesh, bounds) = (&scene.objects[object as usize].mesh, scene.body(object)?.bounds);
         // HG's largest value [1/sr].
         let phase = (1.0 + g.abs()) / (4.0 * PI * (1.0 - g.abs()).powi(2));
         // The focus of a flat boundary seen from behind it is at most 1/(η L)² times the cosine's ratio.
@@ -88,7 +87,7 @@ impl Densities {
 }
 
 /// Density of a direction outside [1/sr] by one drawn inside with density `phase` and let through.
-fn density_outside(body: &Body, bend: &Bend, phase: f32) -> f32 {
+fn density_outside(body: &Interior, bend: &Bend, phase: f32) -> f32 {
     phase * transmittance(1.0 / body.eta, bend.cosines[0] as f32) * bend.focus_of_directions(body.eta.into()) as f32
 }
 
@@ -100,7 +99,7 @@ fn density_outside(body: &Body, bend: &Bend, phase: f32) -> f32 {
 /// chance, with its inverse as weight. Light reflected inside on its way is not in it.
 pub fn drawn_light(
     view: View<'_>,
-    ((body, through), lights, group): ((&Body, &Through), &Lights, Group),
+    ((body, through), lights, group): ((&Interior, &Through), &Lights, Group),
     (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
@@ -115,7 +114,7 @@ pub fn drawn_light(
 }
 
 /// How far away facets are looked for; `None` where no surface is that near.
-fn horizon(body: &Body, x: DVec3, draws: &mut Draws) -> Option<f32> {
+fn horizon(body: &Interior, x: DVec3, draws: &mut Draws) -> Option<f32> {
     let horizon = (SURE - (1.0 - draws.number()).ln()) / body.least_extinction;
     (body.clearance.at(x) <= horizon).then_some(horizon)
 }
@@ -124,7 +123,7 @@ fn horizon(body: &Body, x: DVec3, draws: &mut Draws) -> Option<f32> {
 #[allow(clippy::too_many_arguments)] // what both callers have
 fn arriving(
     view: View<'_>,
-    (body, through): (&Body, &Through),
+    (body, through): (&Interior, &Through),
     drawn: &LightSample,
     (x, w): (DVec3, Vec3),
     horizon: f32,
@@ -177,7 +176,7 @@ fn arriving(
 }
 
 /// What arrives of the radiance over one line, over the density of what was drawn; without absorption.
-fn line(body: &Body, crossing: &Crossing, drawn: &LightSample, phase: f32, alone: bool) -> f32 {
+fn line(body: &Interior, crossing: &Crossing, drawn: &LightSample, phase: f32, alone: bool) -> f32 {
     let by_chance = match drawn.end {
         LightEnd::Point { .. } => {
             let cosine = drawn.cosine(crossing.outside);
@@ -194,7 +193,14 @@ fn line(body: &Body, crossing: &Crossing, drawn: &LightSample, phase: f32, alone
 }
 
 /// Whether nothing stands between `x` and what was drawn.
-fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, drawn: &LightSample, tally: &mut Tally) -> bool {
+fn open(
+    view: View<'_>,
+    body: &Interior,
+    x: DVec3,
+    crossing: &Crossing,
+    drawn: &LightSample,
+    tally: &mut Tally,
+) -> bool {
     let open = is_open(view, body, x, crossing, drawn, &mut tally.walk);
     tally.rays.lights.ask(drawn.light, open);
     open
@@ -202,7 +208,7 @@ fn open(view: View<'_>, body: &Body, x: DVec3, crossing: &Crossing, drawn: &Ligh
 
 fn is_open(
     view: View<'_>,
-    body: &Body,
+    body: &Interior,
     x: DVec3,
     crossing: &Crossing,
     drawn: &LightSample,
@@ -213,8 +219,11 @@ fn is_open(
         return false;
     }
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
+    if body.union.as_ref().is_some_and(|union| !union.bears(crossing.triangle, at.x)) {
+        return false;
+    }
     tally.rays += 1;
-    if view.rays.occluded(&Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
+    if !body.lets_through(view, Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
         return false;
     }
     tally.rays += 1;
@@ -226,7 +235,7 @@ fn is_open(
 pub fn share_by_chance(
     scene: &Scene,
     lights: &Lights,
-    (body, through): (&Body, Option<&Through>),
+    (body, through): (&Interior, Option<&Through>),
     straight: &Straight,
     hit: &Hit,
     direction: Vec3,
@@ -244,7 +253,7 @@ pub fn share_by_chance(
 }
 
 /// The same for a sun, drawn with density `by_point` [1/sr], and [`drawn_light`].
-pub fn sun_share_by_chance((body, through): (&Body, Option<&Through>), straight: &Straight, by_point: f32) -> f32 {
+pub fn sun_share_by_chance((body, through): (&Interior, Option<&Through>), straight: &Straight, by_point: f32) -> f32 {
     let Some(through) = through else { return 1.0 };
     if through.sun_alone(by_point) {
         return 0.0;
@@ -255,7 +264,7 @@ pub fn sun_share_by_chance((body, through): (&Body, Option<&Through>), straight:
 
 #[cfg(test)]
 mod tests {
-    use super::super::body::Flight;
+    use super::super::interior::Flight;
     use super::*;
     use crate::integrator::{VolumePath, VolumePathOptions};
     use crate::light::emitted;

@@ -1,9 +1,9 @@
-//! A translucent object from the inside: flights, collisions, the boundary, until light leaves.
+//! A body of the world from the inside: flights, collisions, the boundary, until light leaves.
 
 use super::draws::Draws;
 use super::facets::Bend;
 use super::spectrum::{Coefficients, Spectrum};
-use crate::geometry::{Clearance, SurfacePoint};
+use crate::geometry::{Clearance, SurfacePoint, Union};
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium};
@@ -12,10 +12,12 @@ use crate::sampling::cosine_hemisphere;
 use crate::scene::{Contacts, Surface};
 use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
+use std::sync::Arc;
 
-/// A homogeneous medium in the closed mesh of one object. Its boundary is the triangles themselves.
-pub struct Body {
-    /// Index of the object.
+/// What paths need of a body of the world ([`crate::scene::Body`]): its medium as they take it, how far it is to its surface, what is around it. Its
+/// boundary is the triangles themselves.
+pub struct Interior {
+    /// Index of the body's surface.
     pub object: u32,
     /// n_inside / n_outside.
     pub eta: f32,
@@ -39,6 +41,8 @@ pub struct Body {
     pub absorbs: Option<Rgb>,
     /// Its triangles that lie in those of other bodies.
     pub contacts: Contacts,
+    /// What bounds it, where its parts meet; paths of a body that is not [`Self::nested`] pass what lies inside.
+    pub union: Option<Arc<Union>>,
 }
 
 /// The straight flight between two collisions.
@@ -111,7 +115,7 @@ pub enum Flight {
     Lost(Cause),
 }
 
-impl Body {
+impl Interior {
     /// The object number `object`, with a table of the surfaces in its box.
     pub fn new(object: u32, medium: &Medium, clearance: Clearance) -> Self {
         let coefficients = Coefficients::new(medium);
@@ -131,7 +135,30 @@ impl Body {
             nested: false,
             absorbs: None,
             contacts: Contacts::new(),
+            union: None,
         }
+    }
+
+    /// The first surface along `ray`, its normals outwards, but for those of its own that lie inside it.
+    #[inline]
+    pub fn closest(&self, view: View<'_>, mut ray: Ray) -> Option<(Hit, SurfacePoint)> {
+        loop {
+            let hit = view.rays.closest(&ray)?;
+            let at = view.outwards(&hit);
+            if hit.mesh != self.object || !self.hides(&hit, &at) {
+                return Some((hit, at));
+            }
+            ray.t_min = hit.t;
+        }
+    }
+
+    /// Whether nothing stands on `ray` but what lies inside the body.
+    pub fn lets_through(&self, view: View<'_>, ray: Ray) -> bool {
+        if self.union.is_some() { self.closest(view, ray).is_none() } else { !view.rays.occluded(&ray) }
+    }
+
+    fn hides(&self, hit: &Hit, at: &SurfacePoint) -> bool {
+        self.union.as_ref().is_some_and(|union| union.hides(hit.triangle, at.x))
     }
 
     /// p(cos θ) [1/sr] between two directions of propagation.
@@ -160,7 +187,7 @@ impl Body {
             return Flight::Collision(from + w.as_dvec3() * f64::from(distance));
         }
         tally.rays += 1;
-        let Some(hit) = view.rays.closest(&Ray { t_max: distance, ..Ray::new(from, w) }) else {
+        let Some((hit, at)) = self.closest(view, Ray { t_max: distance, ..Ray::new(from, w) }) else {
             let x = from + w.as_dvec3() * f64::from(distance);
             return if self.endless || self.clearance.at(x) >= 0.0 {
                 Flight::Collision(x)
@@ -168,12 +195,10 @@ impl Body {
                 Flight::Lost(self.leak)
             };
         };
-        let object = &view.scene.objects[hit.mesh as usize];
-        let at = object.mesh.point(hit.triangle, hit.u, hit.v);
         if hit.mesh == self.object {
             return if at.n_geometric.dot(w) > 0.0 { Flight::Boundary(at, hit.t) } else { Flight::Lost(self.leak) };
         }
-        match &view.scene.materials[object.material].surface {
+        match view.scene.surface(hit.mesh) {
             Surface { emission: Some(_), .. } => Flight::Lamp(hit),
             surface if surface.is_body() => Flight::Lost(Cause::OtherMedium),
             Surface { bsdf, .. } => Flight::Opaque(at.facing(-w), hit.t, bsdf.albedo()),
