@@ -4,10 +4,13 @@
 mod parts;
 mod rendering;
 
+use marmor::bssrdf::ModelName;
 use marmor::integrator::{Integrator, Path, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
-use marmor::scene::{Estimator, Orders, Scene};
+use marmor::query::Backend;
+use marmor::scene::{Estimator, Orders, Scene, View};
+use marmor::tally::Tally;
 use parts::{camera, diffuse, emissive, rectangle, sky, sphere, translucent};
-use rendering::{Within, agree, channels, film, load, means_of, options, subsurface};
+use rendering::{Within, agree, channels, film, load, load_in, means_of, options, subsurface};
 use std::f64::consts::PI;
 
 /// Means over the picture, from independent renders.
@@ -158,6 +161,30 @@ fn long_paths_between_mirrors_end() {
     let scene = load(&text);
     let image = film(&subsurface(&scene, options(Estimator::Cut, 1024, 1)), &scene, 4, 1, &mut []).image();
     assert!(image.pixels.iter().all(|p| p.is_finite()) && channels(&image)[0] > 0.0);
+}
+
+/// Over petals a half space sends out more than has entered. Unbalanced, each round of near fields had more light than the one before, and no
+/// pass of `normalised` came to its end.
+#[test]
+fn light_between_petals_ends_with_every_model() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/lotus");
+    let text = std::fs::read_to_string(folder.join("scene.toml")).unwrap();
+    let text = text.replace("resolution = [512, 512]", "resolution = [12, 12]");
+    for model in ModelName::models() {
+        let marble = format!("preset = \"marble\"\nmodel = {:?}\nthickness = 2", model.name());
+        let scene = load_in(&folder, &text.replace("preset = \"marble\"", &marble));
+        let (samples, mut tally) = (4096, Tally::default());
+        let method = subsurface(&scene, options(Estimator::Cut, samples, 1));
+        let rays = marmor::query::build(Backend::preferred(), &scene.meshes()).unwrap();
+        method.begin_pass(View { scene: &scene, rays: &*rays }, 0, &mut tally);
+        let found = tally.gather.indirect as f64 / f64::from(samples);
+        println!(
+            "{}: {} near fields, {found:.2} samples over other surfaces for one",
+            model.name(),
+            method.near_fields()
+        );
+        assert!((0.1..3.0).contains(&found), "{}: {found}", model.name());
+    }
 }
 
 /// No thread's work, and no pass's, depends on another's.

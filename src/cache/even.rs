@@ -35,7 +35,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let surface = view.scene.surface(body.object()).inside.as_ref()?;
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
-    let own = body.model.total_of_all_faces();
+    let (own, sheet) = (body.model.total_of_all_faces(), body.model.name() == ModelName::SLAB);
     // What begins with light scattered twice competes with light scattered once too: the standard dipole has about the total of both.
     let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
@@ -79,7 +79,8 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
                 let divisor = |c: usize| {
                     // Some models send out more than has entered.
                     let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]).min(1.0));
-                    (s * p + 1.0 - p) as f32
+                    // What would leave by the other face of a sheet is lost where that is not there.
+                    (s * p + 1.0 - p).max(if sheet { 1.0 } else { 0.0 }) as f32
                 };
                 // A channel that no light comes out of is as good as any.
                 Rgb::from_fn(|c| if divisor(c).is_normal() { divisor(c) } else { 1.0 })

@@ -30,7 +30,7 @@ impl Receiver {
     /// Of object number `object` by `model`; `None` where that bounds no body.
     pub fn new(scene: &Scene, object: u32, model: Box<dyn Bssrdf>) -> Option<Self> {
         let body = scene.body(object)?.clone();
-        Some(Self { eta: body.medium.eta, body, union: scene.union(object).cloned(), model })
+        Some(Self { eta: scene.surface(object).medium()?.eta, body, union: scene.union(object).cloned(), model })
     }
 
     /// Index of its surface.

@@ -94,6 +94,7 @@ pub struct Plan {
     options: SubsurfaceOptions,
     /// The body, by its model.
     pub body: Receiver,
+    medium: Medium,
     envelope: Envelope,
     directions: Directions,
     /// Of even passes and of odd ones.
@@ -122,12 +123,13 @@ impl Plan {
         };
         let (near, samples) = near_field(&envelope, body.table().area(), &options);
         let (survey, balance) = (OnceLock::new(), OnceLock::new());
-        Ok(Some(Self { options, body, envelope, directions, streams, near, samples, survey, balance }))
+        let medium = t.medium;
+        Ok(Some(Self { options, body, medium, envelope, directions, streams, near, samples, survey, balance }))
     }
 
     /// The object's medium.
     pub fn medium(&self) -> &Medium {
-        &self.body.body.medium
+        &self.medium
     }
 
     /// What samples this object, by the numbers of `stream`.

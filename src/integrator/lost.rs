@@ -66,7 +66,7 @@ fn why(scene: &Scene, name: &str, cause: Cause) -> String {
             }
         }
         Cause::Endless => {
-            "nothing absorbed them, surface after surface: an albedo below 1, some sigma_a or an opening lets them end"
+            "nothing absorbed them on thousands of surfaces in a row: an albedo below 1, some sigma_a or an opening lets them end"
                 .into()
         }
         Cause::Rounding => {

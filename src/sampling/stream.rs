@@ -16,7 +16,8 @@ pub struct PixelStream {
 impl PixelStream {
     /// The stream of sample number `sample` of pixel number `pixel`.
     pub fn new(seed: u64, pixel: u64, sample: u32) -> Self {
-        Self { key: hash_combine(seed, pixel), index: sample, dimension: 0 }
+        // The zero keeps the numbers of earlier versions.
+        Self { key: hash_combine(hash_combine(seed, pixel), 0), index: sample, dimension: 0 }
     }
 
     /// The next two dimensions, in [0, 1).

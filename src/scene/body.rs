@@ -2,17 +2,14 @@
 
 use crate::geometry::{AreaTable, Findings, Mesh};
 use crate::math::Aabb;
-use crate::optics::Medium;
 
 /// A set of parts with one medium inside: the surface of one object of the scene file, or of several that are one body. Methods keep what they need
-/// besides: models and caches, distances and photons.
+/// besides: models and caches, distances and photons. The medium is that of the surface ([`super::Scene::surface`]).
 pub struct Body {
     /// Index of its surface in [`super::Scene::objects`].
     pub object: u32,
     /// Names of the objects of the scene file that it is made of.
     pub parts: Vec<String>,
-    /// What fills it.
-    pub medium: Medium,
     /// Its box \[unit\].
     pub bounds: Aabb,
     /// Points with equal chance per area of its surface. Places that are kept in f32 are relative to the table's centre, the middle of the box.
@@ -26,14 +23,13 @@ pub struct Body {
 }
 
 impl Body {
-    /// What `medium` fills behind the surface `mesh`, number `object` in the world, in which `found` is wrong; made of objects of these names. `None` without area.
-    pub fn new(object: u32, parts: &[String], medium: Medium, mesh: &Mesh, found: &Findings) -> Option<Self> {
+    /// What is behind the surface `mesh`, number `object` in the world, in which `found` is wrong; made of objects of these names. `None` without area.
+    pub fn new(object: u32, parts: &[String], mesh: &Mesh, found: &Findings) -> Option<Self> {
         let (bounds, table) = (mesh.bounds()?, AreaTable::new(mesh)?);
         let shape = Shape::of(mesh, found);
         Some(Self {
             object,
             parts: parts.to_vec(),
-            medium,
             bounds,
             table,
             closed: found.volume.is_some_and(|v| v > 0.0),

@@ -68,11 +68,12 @@ pub(super) fn choose(
         }
     }
     for (number, object) in objects.iter().enumerate() {
-        let (surface, Some(body)) = (&materials[object.material].surface, &bodies[number]) else { continue };
+        let surface = &materials[object.material].surface;
+        let (Some(medium), Some(body)) = (surface.medium(), &bodies[number]) else { continue };
         let (other, farthest) = worst.iter().find(|w| w.0 != number).copied().unwrap_or((number, 0.0));
         let probes = probes(object, body, farthest / CONTACT);
         let name = &object.name;
-        let (absorbed, sigma) = (body.medium.sigma_a, body.medium.sigma_t_prime());
+        let (absorbed, sigma) = (medium.sigma_a, medium.sigma_t_prime());
         let path = 1.0 / f64::from(sigma.max());
         let decay = (0..3).map(|c| (3.0 * f64::from(absorbed[c]) * f64::from(sigma[c])).sqrt()).fold(0.0, f64::max);
         let limit =

@@ -168,8 +168,8 @@ impl Scene {
     /// The bodies of `objects`, for [`Self::bodies`].
     pub fn bodies_of(objects: &[Object], materials: &[Material]) -> Vec<Option<Arc<Body>>> {
         let of = |(index, o): (u32, &Object)| {
-            let medium = materials[o.material].surface.medium()?;
-            let body = Body::new(index, &o.parts, medium, &o.mesh, &o.findings)?;
+            materials[o.material].surface.medium()?;
+            let body = Body::new(index, &o.parts, &o.mesh, &o.findings)?;
             Some(Arc::new(Body { thickness: body.thickness.map(|t| o.sheet.unwrap_or(t)), ..body }))
         };
         (0..).zip(objects).map(of).collect()

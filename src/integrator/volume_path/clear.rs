@@ -31,7 +31,7 @@ pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -
         && lights.share_beside_suns() < 1.0 - SUNNY;
     for (i, body) in scene.bodies.iter().enumerate() {
         let (Some(body), name) = (body.as_ref().filter(|_| passes(i)), &scene.objects[i].name) else { continue };
-        if !is_clear(body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
+        if !is_clear(scene, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
             continue;
         }
         if sun {
@@ -54,8 +54,9 @@ pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -
 }
 
 /// Whether light goes straight through it in some channel.
-fn is_clear(body: &Body) -> bool {
-    let sigma_t = body.medium.sigma_t();
+fn is_clear(scene: &Scene, body: &Body) -> bool {
+    let Some(medium) = scene.surface(body.object).medium() else { return false };
+    let sigma_t = medium.sigma_t();
     let least = f64::from(sigma_t.0.into_iter().fold(f32::INFINITY, f32::min));
     body.thickness.is_some_and(|thickness| least * thickness < CLEAR)
 }

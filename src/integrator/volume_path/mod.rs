@@ -303,16 +303,17 @@ impl VolumePath {
 /// What paths need of the body of object number `index`, where it is one.
 fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
     let (object, body) = (&scene.objects[index], scene.body(index as u32)?);
+    let medium = scene.surface(body.object).medium()?;
     let clear = scene.surface(body.object).clear.as_ref();
     let cells = if clear.is_some() { 1 } else { cells };
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, body.bounds, cells);
     let interior = match clear {
         Some(clear) => {
-            let void = Medium { sigma_a: Rgb::BLACK, ..body.medium };
+            let void = Medium { sigma_a: Rgb::BLACK, ..medium };
             Interior { absorbs: Some(clear.sigma_a), ..Interior::new(body.object, &void, clearance) }
         }
-        None => Interior::new(body.object, &body.medium, clearance),
+        None => Interior::new(body.object, &medium, clearance),
     };
     let of = |o: &&Obstacle| o.objects.len() == 1 && o.objects[0] == object.name;
     let leak = scene.obstacles().iter().filter(of).find_map(|o| match o.kind {
