@@ -73,7 +73,7 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
             let (mut scratch, mut tally) = (Scratch::default(), Tally::default());
             plan.unbalanced_sum((&gatherer, Detail::Fine), &points, &mut scratch, &mut tally, &mut sums);
             for (point, sum) in points.iter().zip(&mut sums) {
-                *sum = *sum + near_part(plan, view, point, NEAR[1] / count, &mut tally);
+                *sum += near_part(plan, view, point, NEAR[1] / count, &mut tally);
             }
             let divisor = |sum: &Rgb| {
                 let divisor = |c: usize| {

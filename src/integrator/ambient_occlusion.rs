@@ -47,6 +47,12 @@ impl Integrator for AmbientOcclusion {
             let mut occluded = vec![false; probes.len()];
             view.rays.occluded_batch(&probes, &mut occluded);
             tally.rays.shadow += probes.len() as u64;
+            // Below the triangle, where only an interpolated normal looks up to, nothing is open.
+            let each = points.iter().zip(probes.chunks_exact(per_hit)).zip(occluded.chunks_exact_mut(per_hit));
+            for ((at, probes), occluded) in each {
+                let below = |probe: &Ray| at.n_geometric.dot(probe.direction) <= 0.0;
+                probes.iter().zip(occluded).for_each(|(probe, occluded)| *occluded |= below(probe));
+            }
 
             let mut groups = occluded.chunks_exact(per_hit);
             for (hit, out) in hits.iter().zip(out) {

@@ -1,8 +1,9 @@
 //! Cameras and pictures at the ends of what there is.
 
 use super::harness::{BASE, backends, load, ok, refused, shots, warns, with};
+use super::rendering::on;
 use marmor::film::Window;
-use marmor::integrator::View;
+use marmor::integrator::{AmbientOcclusion, View};
 use marmor::query::{self, Backend};
 use marmor::render::{Aim, nothing_in_view, shares};
 
@@ -123,6 +124,10 @@ fn a_camera_in_a_closed_opaque_body_warns() {
     for shot in warns(&load(&shut).unwrap(), &["\"hood\": the camera is inside it", "no lamp is in it"]) {
         assert!(shot.image.pixels.iter().all(|p| p.is_black()), "{}", shot.what);
     }
+    // Nor does a direction below a facet lead out of it, where only its interpolated normal looks up.
+    let seen = load(&shut.replacen("resolution = [8, 6]", "resolution = [96, 96]", 1)).unwrap();
+    let (film, _) = on(Backend::preferred(), &seen, &AmbientOcclusion { radius: f32::INFINITY, rays: 16 }, 1, 0..4);
+    assert!(film.image().pixels.iter().all(|p| p.is_black()));
     // A lamp in it, or around all of it: a room.
     let room = shut.replacen("centre = [0, 4, 0]", "centre = [0, 1, 6.3]", 1);
     let room = room.replacen("edge_u = [1, 0, 0]\nedge_v = [0, 0, 1]", "edge_u = [0.1, 0, 0]\nedge_v = [0, 0, 0.1]", 1);
