@@ -15,7 +15,9 @@ use std::time::{Duration, Instant};
 
 use criterion::{Criterion, Throughput};
 use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
-use marmor::cache::{Cache, Density, Detail, Directions, Envelope, Filler, Gatherer, Receiver, Scratch, Tuning};
+use marmor::cache::{
+    Cache, CacheBuilder, CachedBody, Density, Detail, Directions, Envelope, Gatherer, Scratch, Tuning,
+};
 use marmor::geometry::{AreaTable, load_obj};
 use marmor::light::Lights;
 use marmor::math::{DVec3, Rgb, hash};
@@ -71,13 +73,13 @@ struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    fn body(&self, model: Box<dyn Bssrdf>) -> Receiver {
-        Receiver::new(self.scene, 0, model).unwrap()
+    fn body(&self, model: Box<dyn Bssrdf>) -> CachedBody {
+        CachedBody::new(self.scene, 0, model).unwrap()
     }
 
-    fn fill(&self, body: &Receiver, count: u32) -> Cache {
+    fn fill(&self, body: &CachedBody, count: u32) -> Cache {
         let stream = CacheStream::new(Points::Sobol, 1, 0);
-        let filler = Filler {
+        let builder = CacheBuilder {
             view: View { scene: self.scene, rays: self.rays },
             lights: self.lights,
             body,
@@ -85,7 +87,7 @@ impl Bench<'_> {
             stream: &stream,
             density: &Density::even(),
         };
-        filler.fill(0, count, &mut Tally::default())
+        builder.fill(0, count, &mut Tally::default())
     }
 
     /// Hits of some tiles of the picture, tile by tile.

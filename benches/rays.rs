@@ -22,7 +22,7 @@ use marmor::geometry::Mesh;
 use marmor::math::{DVec3, Vec3};
 use marmor::query::{self, Backend, Ray, RayQuery};
 use marmor::sampling::cosine_hemisphere;
-use scenes::{Draws, bumpy_sphere};
+use scenes::{PathSampler, bumpy_sphere};
 
 /// Rays that are handed over together, as the renderer does with those of a tile.
 const BATCH: usize = 1024;
@@ -154,7 +154,7 @@ fn kinds(mesh: &Mesh, query: &dyn RayQuery) -> Vec<Kind> {
             Ray::new(eye, forward + right * (x * 0.8) - up * (y * 0.8))
         })
         .collect();
-    let mut draws = Draws::new(1);
+    let mut draws = PathSampler::new(1);
     let (mut bounce, mut shadow, mut occlusion) = (Vec::new(), Vec::new(), Vec::new());
     for ray in &primary {
         let Some(hit) = query.closest(ray) else { continue };

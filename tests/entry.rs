@@ -6,7 +6,7 @@ mod rendering;
 
 use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
 use marmor::cache::{
-    CachedSample, Density, Directions, Envelope, Filler, GatherPoint, NearField, Receiver, Survey, seen,
+    CacheBuilder, CachedBody, CachedSample, Density, Directions, Envelope, GatherPoint, NearField, Survey, seen,
 };
 use marmor::light::Lights;
 use marmor::math::{Rgb, Vec3};
@@ -36,7 +36,7 @@ struct Set {
     scene: &'static Scene,
     rays: Box<dyn RayQuery>,
     lights: Lights,
-    body: Receiver,
+    body: CachedBody,
 }
 
 impl Set {
@@ -45,15 +45,15 @@ impl Set {
         let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
         let lights = Lights::new(scene);
         let model = name.build(&MEDIUM, &ModelOptions::DEFAULT).unwrap();
-        Self { rays, lights, body: Receiver::new(scene, 0, model).unwrap(), scene }
+        Self { rays, lights, body: CachedBody::new(scene, 0, model).unwrap(), scene }
     }
 
     fn view(&self) -> View<'_> {
         View { scene: self.scene, rays: &*self.rays }
     }
 
-    fn filler<'a>(&'a self, stream: &'a CacheStream, density: &'a Density, cosine_share: f32) -> Filler<'a> {
-        Filler {
+    fn builder<'a>(&'a self, stream: &'a CacheStream, density: &'a Density, cosine_share: f32) -> CacheBuilder<'a> {
+        CacheBuilder {
             view: self.view(),
             lights: &self.lights,
             body: &self.body,
@@ -71,7 +71,7 @@ const FLUX_SAMPLES: u32 = 40_000;
 fn flux(set: &Set, density: &Density, cosine_share: f32) -> [f64; 2] {
     let each = (0..40).map(|seed| {
         let stream = CacheStream::new(Points::Independent, seed, 0);
-        let cache = set.filler(&stream, density, cosine_share).fill(0, FLUX_SAMPLES, &mut Tally::default());
+        let cache = set.builder(&stream, density, cosine_share).fill(0, FLUX_SAMPLES, &mut Tally::default());
         cache.lit.iter().map(|s| f64::from(s.flux.mean())).sum::<f64>() / f64::from(FLUX_SAMPLES)
     });
     mean_of(each).into()
@@ -114,7 +114,7 @@ fn samples_spread_by_what_is_seen_bring_the_same_flux_as_an_even_spread() {
     let (even, stream) = (Density::even(), CacheStream::new(Points::Sobol, 99, 0));
     let points = seen(set.view());
     assert!(points[0].len() > 100 && points[1].len() < points[0].len());
-    let survey = Survey::new(&set.filler(&stream, &even, 0.0), &envelope, &points[0], Spread::Seen, 32768);
+    let survey = Survey::new(&set.builder(&stream, &even, 0.0), &envelope, &points[0], Spread::Seen, 32768);
     assert!(survey.variance > 0.0 && survey.typical.x > 0.0);
     assert!(survey.noise2(1e4) > survey.noise2(1e5));
     let found = [flux(&set, &even, 0.0), flux(&set, &survey.density, 0.0)];
@@ -144,7 +144,7 @@ impl Set {
     /// Mean and standard error of the near field at each of `exits`: what their lines find together, and what caches have.
     fn near_field(&self, near: &NearField, exits: &[Exit], runs: u64) -> Vec<[[f64; 2]; 2]> {
         let (even, stream) = (Density::even(), CacheStream::new(Points::Independent, 1, 0));
-        let filler = self.filler(&stream, &even, 0.0);
+        let builder = self.builder(&stream, &even, 0.0);
         let own = |run: u64| {
             let point = |(i, &exit): (u64, &Exit)| {
                 let stream = PixelStream::new(5, run * exits.len() as u64 + i, 3);
@@ -152,13 +152,13 @@ impl Set {
             };
             let points: Vec<GatherPoint> = (0..).zip(exits).map(point).collect();
             let (mut sums, mut tally) = (vec![Rgb::BLACK; exits.len()], Tally::default());
-            near.add(&filler, &points, &mut tally, &mut sums);
+            near.add(&builder, &points, &mut tally, &mut sums);
             let gather = tally.gather;
             assert!(gather.near <= gather.near_points * exits.len() as u64 && gather.non_finite == 0);
             sums
         };
         let own: Vec<Vec<Rgb>> = (0..runs).map(own).collect();
-        let caches: Vec<_> = (0..300).map(|i| filler.fill(i * 2000, 2000, &mut Tally::default())).collect();
+        let caches: Vec<_> = (0..300).map(|i| builder.fill(i * 2000, 2000, &mut Tally::default())).collect();
         let both = |(i, exit): (usize, &Exit)| {
             let cached = caches.iter().map(|c| near_part(near, &*self.body.model, &c.lit, exit) / 2000.0);
             [mean_of(own.iter().map(|sums| f64::from(sums[i].mean()))), mean_of(cached)].map(Into::into)

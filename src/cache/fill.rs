@@ -15,7 +15,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// A body as light enters it, by its model.
-pub struct Receiver {
+pub struct CachedBody {
     /// The body itself.
     pub body: Arc<Body>,
     /// What bounds it, where its parts meet.
@@ -26,7 +26,7 @@ pub struct Receiver {
     pub eta: f32,
 }
 
-impl Receiver {
+impl CachedBody {
     /// Of object number `object` by `model`; `None` where that bounds no body.
     pub fn new(scene: &Scene, object: u32, model: Box<dyn Bssrdf>) -> Option<Self> {
         let body = scene.body(object)?.clone();
@@ -78,13 +78,13 @@ pub enum Directions {
 }
 
 /// What fills the cache of one object, pass after pass.
-pub struct Filler<'a> {
+pub struct CacheBuilder<'a> {
     /// The scene and its rays.
     pub view: View<'a>,
     /// Its lights.
     pub lights: &'a Lights,
     /// The object.
-    pub body: &'a Receiver,
+    pub body: &'a CachedBody,
     /// How directions are picked.
     pub directions: Directions,
     /// The object's long stream of points.
@@ -104,7 +104,7 @@ pub struct Shadow {
 /// Samples filled by one task; their shadow rays form one batch.
 const CHUNK: u64 = 256;
 
-impl Filler<'_> {
+impl CacheBuilder<'_> {
     /// The samples with numbers `first`..`first + count`, in parallel. Which thread fills which sample does not
     /// matter: a sample is a function of its number.
     pub fn fill(&self, first: u64, count: u32, tally: &mut Tally) -> Cache {
@@ -230,7 +230,7 @@ impl Filler<'_> {
     }
 
     /// Point number `number` of the surface, flat as the triangle it lies on, area over its density, four numbers for the
-    /// light and one for the depth; `None` as [`Receiver::place`].
+    /// light and one for the depth; `None` as [`CachedBody::place`].
     pub fn point(&self, number: u64) -> Option<(SurfacePoint, f32, [f32; 5])> {
         let (pick, u) = self.stream.numbers(number);
         let (pick, weight) = self.density.place(pick);

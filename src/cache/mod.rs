@@ -25,7 +25,7 @@ pub use density::Density;
 pub use envelope::{Envelope, Fall};
 pub use estimate::{Detail, Gatherer, PLAIN_SUM};
 pub use even::balance;
-pub use fill::{Directions, Filler, Receiver, Shadow};
+pub use fill::{CacheBuilder, CachedBody, Directions, Shadow};
 pub use near::{GatherPoint, NearField, Step};
 pub use notes::notes;
 pub use plan::{Plan, SubsurfaceOptions};

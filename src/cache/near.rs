@@ -1,7 +1,7 @@
 //! Light that enters close to an exit, sampled anew for each exit: for media whose light does not come as far as the next
 //! sample of a cache.
 
-use super::{CachedSample, Columns, Envelope, Filler, Receiver, Shadow};
+use super::{CacheBuilder, CachedBody, CachedSample, Columns, Envelope, Shadow};
 use crate::bssrdf::{Exit, Layout, Partition};
 use crate::geometry::{SurfacePoint, Union};
 use crate::math::{DVec3, Rgb, Vec3, frame};
@@ -170,9 +170,9 @@ impl NearField {
 
     /// Adds an estimate of ∫∫ S_d near(r) T12 L_i cosθ_i dω dA for each of `points` to `sums`. All surfaces found along lines parallel
     /// to the normals and tangents of neighbouring exits count for each of them, over the density of all their lines together.
-    pub fn add(&self, filler: &Filler<'_>, points: &[GatherPoint], tally: &mut Tally, sums: &mut [Rgb]) {
+    pub fn add(&self, builder: &CacheBuilder<'_>, points: &[GatherPoint], tally: &mut Tally, sums: &mut [Rgb]) {
         let (start, before) = (Instant::now(), tally.clock.rays);
-        let model = &*filler.body.model;
+        let model = &*builder.body.model;
         let [mut all, mut own] = [0; 2].map(|_| Columns::new(model.layout()));
         let mut picked = Vec::new();
         for (points, sums) in points.chunks(GROUP).zip(sums.chunks_mut(GROUP)) {
@@ -181,8 +181,8 @@ impl NearField {
                 Middle { x: point.place, axes: [Vec3::Z, Vec3::X, Vec3::Y].map(|a| frame * a) }
             };
             let middles: Vec<Middle> = points.iter().map(middle).collect();
-            let candidates = self.along(filler, self.lines(&middles, points), tally);
-            let found = self.lit(filler, &middles, candidates, tally);
+            let candidates = self.along(builder, self.lines(&middles, points), tally);
+            let found = self.lit(builder, &middles, candidates, tally);
             tally.gather.near_points += found.len() as u64;
             all.refill(model, found.iter().map(|f| &f.sample));
             for (point, sum) in points.iter().zip(sums) {
@@ -231,8 +231,8 @@ impl NearField {
     }
 
     /// What enters where the lines meet the object, all of them at once, surface after surface.
-    fn along(&self, filler: &Filler<'_>, mut lines: Vec<Line>, tally: &mut Tally) -> Vec<Candidate> {
-        let view = filler.view;
+    fn along(&self, builder: &CacheBuilder<'_>, mut lines: Vec<Line>, tally: &mut Tally) -> Vec<Candidate> {
+        let view = builder.view;
         let mut candidates = Vec::with_capacity(lines.len());
         let mut surface = 0;
         let (mut asked, mut hits): (Vec<Ray>, Vec<Option<Hit>>) = (Vec::new(), Vec::new());
@@ -241,7 +241,7 @@ impl NearField {
             asked.extend(lines.iter().map(|line| line.ray));
             hits.clear();
             hits.resize(lines.len(), None);
-            Clock::time(&mut tally.clock.rays, || filler.view.rays.closest_batch(&asked, &mut hits));
+            Clock::time(&mut tally.clock.rays, || builder.view.rays.closest_batch(&asked, &mut hits));
             tally.rays.bounce += lines.len() as u64;
             let mut hit = hits.iter();
             lines.retain_mut(|line| {
@@ -254,9 +254,9 @@ impl NearField {
                 let square = f64::from(self.radius) * f64::from(self.radius);
                 let near = |place: &DVec3| place.distance_squared(line.middle) <= square;
                 if !again
-                    && hit.mesh == filler.body.object()
+                    && hit.mesh == builder.body.object()
                     && let Some(place) = crossing().filter(near)
-                    && line.is_new(filler.body.union.as_deref(), hit, place)
+                    && line.is_new(builder.body.union.as_deref(), hit, place)
                 {
                     let at = view.outwards(hit);
                     surface += 1;
@@ -264,7 +264,7 @@ impl NearField {
                         let mut numbers = line.numbers.split(part, LIGHTS);
                         let ([u, v, pick, share], depth) = (numbers.next_4d(), numbers.next_1d());
                         // The lights have the first two numbers, which are spread best: their noise is the largest.
-                        let entering = filler.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], tally);
+                        let entering = builder.entering(at, 1.0 / LIGHTS as f32, [pick, u, v, share, depth], tally);
                         candidates.extend(entering.map(|(mut sample, shadow)| {
                             sample.entry.x = Vec3::ZERO;
                             Candidate { surface, n_geometric: at.n_geometric, place, sample, shadow }
@@ -284,20 +284,20 @@ impl NearField {
     /// Those candidates that nothing hides, over the density of all lines.
     fn lit(
         &self,
-        filler: &Filler<'_>,
+        builder: &CacheBuilder<'_>,
         middles: &[Middle],
         candidates: Vec<Candidate>,
         tally: &mut Tally,
     ) -> Vec<Found> {
         let shadows: Vec<Ray> = candidates.iter().filter_map(|c| Some(c.shadow.as_ref()?.ray)).collect();
         let mut hidden = vec![false; shadows.len()];
-        Clock::time(&mut tally.clock.rays, || filler.view.rays.occluded_batch(&shadows, &mut hidden));
+        Clock::time(&mut tally.clock.rays, || builder.view.rays.occluded_batch(&shadows, &mut hidden));
         tally.rays.shadow += shadows.len() as u64;
         let mut hidden = hidden.into_iter();
         let mut found: Vec<Found> = Vec::with_capacity(candidates.len());
         let (mut last, mut density) = (0, 0.0);
         // Where the distance alone decides, all light at one point is one sample.
-        let joined = filler.body.model.layout() == Layout::POINTS;
+        let joined = builder.body.model.layout() == Layout::POINTS;
         for Candidate { surface, n_geometric, place, mut sample, shadow } in candidates {
             if let Some(shadow) = shadow {
                 let open = hidden.next() == Some(false);
@@ -331,7 +331,7 @@ impl NearField {
     pub fn step(
         &self,
         view: View<'_>,
-        body: &Receiver,
+        body: &CachedBody,
         (from, n): (DVec3, Vec3),
         mut numbers: PixelStream,
         tally: &mut Tally,

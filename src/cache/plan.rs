@@ -2,8 +2,8 @@
 //! way of a pass.
 
 use super::{
-    Balance, Cache, CachedSample, Columns, Density, Detail, Directions, Envelope, Filler, GatherPoint, Gatherer,
-    NearField, Receiver, Scratch, Seen, Survey, Tuning,
+    Balance, Cache, CacheBuilder, CachedBody, CachedSample, Columns, Density, Detail, Directions, Envelope,
+    GatherPoint, Gatherer, NearField, Scratch, Seen, Survey, Tuning,
 };
 use crate::bssrdf::{Entry, Exit, Partition};
 use crate::error::Result;
@@ -93,7 +93,7 @@ const COARSEST: f64 = 0.2;
 pub struct Plan {
     options: SubsurfaceOptions,
     /// The body, by its model.
-    pub body: Receiver,
+    pub body: CachedBody,
     medium: Medium,
     envelope: Envelope,
     directions: Directions,
@@ -114,7 +114,7 @@ impl Plan {
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, lights: &Lights, object: u32, options: SubsurfaceOptions) -> Result<Option<Self>> {
         let (Some(t), Some(_)) = (&scene.surface(object).inside, scene.body(object)) else { return Ok(None) };
-        let Some(body) = Receiver::new(scene, object, t.build()?) else { return Ok(None) };
+        let Some(body) = CachedBody::new(scene, object, t.build()?) else { return Ok(None) };
         let envelope = Envelope::new(&*body.model, &t.medium);
         let streams = Turn::seeds(options.seed).map(|seed| CacheStream::new(options.points, seed, object.into()));
         let directions = match options.entry {
@@ -133,14 +133,14 @@ impl Plan {
     }
 
     /// What samples this object, by the numbers of `stream`.
-    pub fn filler<'a>(
+    pub fn builder<'a>(
         &'a self,
         view: View<'a>,
         lights: &'a Lights,
         stream: &'a CacheStream,
         density: &'a Density,
-    ) -> Filler<'a> {
-        Filler { view, lights, body: &self.body, directions: self.directions, stream, density }
+    ) -> CacheBuilder<'a> {
+        CacheBuilder { view, lights, body: &self.body, directions: self.directions, stream, density }
     }
 
     /// What is known before the first pass, from the points of the object that the camera sees. A function of scene and seed: the
@@ -154,18 +154,18 @@ impl Plan {
             }
             let stream = CacheStream::new(self.options.points, !self.options.seed, self.body.object().into());
             let even = Density::even();
-            let filler = self.filler(view, lights, &stream, &even);
-            Survey::new(&filler, &self.envelope, seen, self.options.spread, self.samples)
+            let builder = self.builder(view, lights, &stream, &even);
+            Survey::new(&builder, &self.envelope, seen, self.options.spread, self.samples)
         });
     }
 
     /// Fills the cache of pass number `pass` with light straight from the lights.
     pub fn fill(&self, view: View<'_>, lights: &Lights, pass: u32, tally: &mut Tally) -> Cache {
         let turn = Turn::of(self.options.seed, pass);
-        let filler = self.filler(view, lights, &self.streams[turn.stream], self.density());
+        let builder = self.builder(view, lights, &self.streams[turn.stream], self.density());
         let first = u64::from(turn.number) * u64::from(self.samples);
         let start = std::time::Instant::now();
-        let mut cache = filler.fill(first, self.samples, tally);
+        let mut cache = builder.fill(first, self.samples, tally);
         tally.clock.fill += start.elapsed().as_secs_f64();
         let all = cache.lit.len();
         cache.lit.retain(CachedSample::is_finite);
@@ -262,7 +262,7 @@ impl Plan {
         self.unbalanced_sum(cache, points, scratch, tally, sums);
         if let Some(near) = &self.near {
             let even = Density::even();
-            near.add(&self.filler(view, lights, &self.streams[0], &even), points, tally, sums);
+            near.add(&self.builder(view, lights, &self.streams[0], &even), points, tally, sums);
         }
         self.balance(points, sums);
     }

@@ -1,6 +1,6 @@
 //! What is known before the first pass: where light enters that the camera gets to see, from a trial cache and a grid of camera rays.
 
-use super::{CachedSample, Density, Envelope, Filler};
+use super::{CacheBuilder, CachedSample, Density, Envelope};
 use crate::math::{DVec3, Vec3, Vec4};
 use crate::scene::{Spread, View};
 
@@ -44,13 +44,13 @@ impl Survey {
         Self { density: Density::even(), typical: Vec4::ZERO, variance: 0.0 }
     }
 
-    /// Of the light that `filler` finds, as it reaches the points `seen`, for passes of `count` samples. [`Self::none`] where
+    /// Of the light that `builder` finds, as it reaches the points `seen`, for passes of `count` samples. [`Self::none`] where
     /// there are none or all is dark.
-    pub fn new(filler: &Filler<'_>, envelope: &Envelope, seen: &[Seen], spread: Spread, count: u32) -> Self {
+    pub fn new(builder: &CacheBuilder<'_>, envelope: &Envelope, seen: &[Seen], spread: Spread, count: u32) -> Self {
         let bins = (count / PASS_PER_PILOT / PILOTS_PER_BIN).clamp(8, BINS);
         let attempted = bins * PILOTS_PER_BIN;
-        let pilots = filler.pilots(attempted);
-        let local = |s: &Seen| ((s.x - filler.body.table().centre()).as_vec3(), s.spread2);
+        let pilots = builder.pilots(attempted);
+        let local = |s: &Seen| ((s.x - builder.body.table().centre()).as_vec3(), s.spread2);
         let seen: Vec<(Vec3, f32)> = seen.iter().map(local).collect();
         let sums: Vec<Vec4> = seen.iter().map(|s| pilots.iter().map(|(_, p)| share(envelope, s, p)).sum()).collect();
         let mean = sums.iter().sum::<Vec4>() / sums.len().max(1) as f32;

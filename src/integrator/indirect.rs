@@ -5,7 +5,7 @@
 //! mirrored it, or out of which it came, it is followed forwards: from places on bodies where the light of all samples so far is gathered
 //! as for a pixel, and from places where light arrives. What it brings to a body is a sample as any other, gathered by the next round.
 
-use super::volume_path::{Draws, Modelled, VolumePath, VolumePathOptions};
+use super::volume_path::{Modelled, PathSampler, VolumePath, VolumePathOptions};
 use super::{MOST_SURFACES, Part, View};
 use crate::bssrdf::Exit;
 use crate::cache::{Cache, CachedSample, Detail, GatherPoint, Plan, Scratch, SubsurfaceOptions};
@@ -211,11 +211,11 @@ impl Round<'_> {
     fn backwards(&self, plan: &Plan, rows: &mut Rows, tally: &mut Tally) {
         let Some(paths) = &self.of.surfaces else { return };
         let stream = &self.of.streams[plan.body.object() as usize][self.turn.stream];
-        let filler = plan.filler(self.view, self.lights, stream, plan.density());
+        let builder = plan.builder(self.view, self.lights, stream, plan.density());
         let first = u64::from(self.turn.number) * u64::from(self.of.count);
         let key = self.key(plan, 1);
         self.tasks(self.of.count, rows, tally, |i, found| {
-            let Some((at, weight, u)) = filler.point(first + i) else { return };
+            let Some((at, weight, u)) = builder.point(first + i) else { return };
             let Some((w, ray)) = Lights::look_up(&at, [u[1], u[2]]) else { return };
             found.tally.rays.bounce += 1;
             let Some(hit) = self.view.rays.closest(&ray) else { return };
@@ -223,7 +223,7 @@ impl Round<'_> {
             if !surface.is_opaque() && surface.clear.is_none() {
                 return;
             }
-            let mut draws = Draws::new(&[u[4], u[0], u[3]], hash_combine(key, i));
+            let mut draws = PathSampler::new(&[u[4], u[0], u[3]], hash_combine(key, i));
             let depth = draws.number();
             let light = paths.arriving(self.view, &hit, w, draws.fork_with(&[u[4], u[0], u[3]], 0), &mut found.tally);
             if light.is_black() {
@@ -238,16 +238,16 @@ impl Round<'_> {
     /// Light straight from lights, where the boundary of the body mirrors it, or lets it through unscattered or nearly so.
     fn mirrored(&self, plan: &Plan, rows: &mut Rows, tally: &mut Tally) {
         let stream = &self.of.streams[plan.body.object() as usize][self.turn.stream];
-        let filler = plan.filler(self.view, self.lights, stream, plan.density());
+        let builder = plan.builder(self.view, self.lights, stream, plan.density());
         let first = u64::from(self.turn.number) * u64::from(self.of.count);
         let key = self.key(plan, 2);
         self.tasks(self.of.count, rows, tally, |i, found| {
-            let Some((at, w, flux)) = filler.arriving(first + i, &mut found.tally) else { return };
+            let Some((at, w, flux)) = builder.arriving(first + i, &mut found.tally) else { return };
             if flux.is_black() {
                 return;
             }
             let flux = flux * (1.0 / self.of.count as f32);
-            let mut draws = Draws::new(&[], hash_combine(key, i));
+            let mut draws = PathSampler::new(&[], hash_combine(key, i));
             let mirrored = reflectance(plan.body.eta, w.dot(at.n));
             let away = reflect(w, at.n);
             self.follow(Ray::new(at.leave(away), away), flux * mirrored, draws.fork(0), found);
@@ -317,7 +317,7 @@ impl Round<'_> {
                 for ((at, point), sum) in places.iter().zip(&points).zip(&sums) {
                     let w = point.exit.w;
                     let flux = *sum * (each * transmittance(plan.body.eta, w.dot(at.n)));
-                    self.follow(Ray::new(at.leave(w), w), flux, Draws::new(&[], point.stream.key()), &mut found);
+                    self.follow(Ray::new(at.leave(w), w), flux, PathSampler::new(&[], point.stream.key()), &mut found);
                 }
                 found
             })
@@ -326,7 +326,7 @@ impl Round<'_> {
     }
 
     /// Follows light along `ray` until nothing is left of it.
-    fn follow(&self, mut ray: Ray, mut flux: Rgb, mut draws: Draws, found: &mut Found) {
+    fn follow(&self, mut ray: Ray, mut flux: Rgb, mut draws: PathSampler, found: &mut Found) {
         for _ in 0..self.of.bounces {
             if !flux.is_finite() {
                 found.tally.gather.non_finite += 1;
@@ -375,14 +375,20 @@ impl Round<'_> {
     }
 
     /// A sample of what enters, and what is left of the light followed.
-    fn enter(&self, arrived: &Arrived<'_>, depth: f32, mut draws: Draws, found: &mut Found) {
+    fn enter(&self, arrived: &Arrived<'_>, depth: f32, mut draws: PathSampler, found: &mut Found) {
         if let Some((ray, flux)) = self.goes_on(arrived, depth, &mut draws, found) {
             self.follow(ray, flux, draws, found);
         }
     }
 
     /// A sample of what enters; the light goes on mirrored, by the chance of it, or by what the model lacks.
-    fn goes_on(&self, arrived: &Arrived<'_>, depth: f32, draws: &mut Draws, found: &mut Found) -> Option<(Ray, Rgb)> {
+    fn goes_on(
+        &self,
+        arrived: &Arrived<'_>,
+        depth: f32,
+        draws: &mut PathSampler,
+        found: &mut Found,
+    ) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
         let sample = plan.body.enters(&at, w, (flux, 1.0), depth);
         found.rows.extend(sample.map(|sample| (plan.body.object(), sample)));
@@ -406,7 +412,7 @@ impl Round<'_> {
         at: &SurfacePoint,
         w: Vec3,
         flux: Rgb,
-        draws: &mut Draws,
+        draws: &mut PathSampler,
         found: &mut Found,
     ) -> Option<(Ray, Rgb)> {
         let near = plan.near.as_ref()?;
@@ -440,7 +446,7 @@ impl Round<'_> {
         at: &SurfacePoint,
         w: Vec3,
         flux: Rgb,
-        draws: &mut Draws,
+        draws: &mut PathSampler,
         found: &mut Found,
     ) -> Option<(Ray, Rgb)> {
         let inside = refract(w, at.n, plan.body.eta)?;

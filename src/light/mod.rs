@@ -197,7 +197,7 @@ pub struct Arrival {
 impl Arrival {
     /// Its share by the balance heuristic [VG95] beside directions of the density `other` [1/sr].
     #[inline]
-    pub fn share_beside(&self, other: f32) -> f32 {
+    pub fn mis_weight_beside(&self, other: f32) -> f32 {
         1.0 / (1.0 + other / self.pdf_angle)
     }
 }

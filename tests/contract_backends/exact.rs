@@ -1,6 +1,6 @@
 //! Rays in f64 alone: what no backend in f32 could do.
 
-use super::scenes::{Draws, soup};
+use super::scenes::{PathSampler, soup};
 use marmor::geometry::{Mesh, Precision};
 use marmor::math::{DVec3, Vec3};
 use marmor::query::{self, Backend, Ray};
@@ -8,7 +8,7 @@ use marmor::query::{self, Backend, Ray};
 /// A ray that leaves a surface does not meet it again: as in f32, with a bound that is half a billion times smaller.
 #[test]
 fn rays_that_leave_a_surface_do_not_hit_it() {
-    let mut draws = Draws::new(14);
+    let mut draws = PathSampler::new(14);
     for offset in [0.0, 1e3, 1e9] {
         let mut mesh = soup(&mut draws, 200);
         mesh.precision = Precision::Double;
@@ -33,7 +33,7 @@ fn rays_that_leave_a_surface_do_not_hit_it() {
 /// Sheets that f32 cannot tell apart, seen from both sides, and what is found on them.
 #[test]
 fn sheets_are_told_apart_that_f32_cannot() {
-    let mut draws = Draws::new(15);
+    let mut draws = PathSampler::new(15);
     let corner = |x: f64, y: f64, z: f64| DVec3::new(1e4 * x, 1e4 * y, z + 3.0);
     let mut mesh = Mesh { precision: Precision::Double, ..Mesh::default() };
     for i in 0..20 {

@@ -10,7 +10,7 @@ use marmor::geometry::Mesh;
 use marmor::math::{DVec3, Vec3};
 use marmor::query::{self, Backend, Ray, RayQuery};
 use reference::{examine, is_open, nearest_in_f64, verdict};
-use scenes::{Draws, bumpy_sphere, mesh_of, placed, rays, soup};
+use scenes::{PathSampler, bumpy_sphere, mesh_of, placed, rays, soup};
 
 const EMBREE: &str = "embree";
 
@@ -63,7 +63,7 @@ fn check(what: &str, meshes: &[&Mesh], rays: &[Ray]) -> Tally {
 fn random_triangles_at_every_scale_in_several_meshes() {
     for exponent in [-6, -3, 0, 3, 6] {
         let scale = 10_f32.powi(exponent);
-        let mut draws = Draws::new(1);
+        let mut draws = PathSampler::new(1);
         let meshes: Vec<Mesh> = [200, 0, 1, 150].map(|n| placed(&soup(&mut draws, n), scale, Vec3::ZERO)).into();
         let meshes: Vec<&Mesh> = meshes.iter().collect();
         let rays = rays(&mut draws, 1500, scale, Vec3::ZERO);
@@ -78,7 +78,7 @@ fn random_triangles_at_every_scale_in_several_meshes() {
 #[test]
 fn triangles_far_from_the_origin_lose_nothing() {
     for (size, offset) in [(1.0, 1e4), (100.0, 1e6), (1e-2, 1e3)] {
-        let mut draws = Draws::new(2);
+        let mut draws = PathSampler::new(2);
         let offset = Vec3::new(1.0, -0.7, 0.4) * offset;
         let mesh = placed(&soup(&mut draws, 200), size, offset);
         let rays = rays(&mut draws, 1500, size, offset);
@@ -90,7 +90,7 @@ fn triangles_far_from_the_origin_lose_nothing() {
 
 #[test]
 fn triangles_without_area_are_never_hit_and_needles_are_no_trouble() {
-    let mut draws = Draws::new(3);
+    let mut draws = PathSampler::new(3);
     let mut triangles = Vec::new();
     for _ in 0..100 {
         let [a, b] = [draws.point(), draws.point()];
@@ -119,7 +119,7 @@ fn triangles_without_area_are_never_hit_and_needles_are_no_trouble() {
 /// Corners on a grid of halves and rays along its lines: every comparison is a tie.
 #[test]
 fn rays_along_the_axes_through_a_grid() {
-    let mut draws = Draws::new(4);
+    let mut draws = PathSampler::new(4);
     let mut step = |n: usize| draws.below(n) as f32 * 0.5;
     let mesh = mesh_of((0..200).map(|_| [0; 3].map(|_| Vec3::new(step(5), step(5), step(5)))));
     let mut rays = Vec::new();
@@ -146,7 +146,7 @@ fn rays_along_the_axes_through_a_grid() {
 #[test]
 fn rays_in_the_plane_of_a_triangle() {
     let flat = mesh_of([[Vec3::ZERO, Vec3::X, Vec3::Y]]);
-    let mut draws = Draws::new(5);
+    let mut draws = PathSampler::new(5);
     let tilted = mesh_of([[draws.point(), draws.point(), draws.point()]]);
     for mesh in [&flat, &tilted] {
         let [a, b, c] = mesh.corners(0).map(|p| p.as_vec3());
@@ -167,7 +167,7 @@ fn rays_in_the_plane_of_a_triangle() {
 fn a_closed_mesh_has_no_leaks() {
     for scale in [1e-6, 1.0, 1e6] {
         let mesh = placed(&bumpy_sphere(24), scale, Vec3::ZERO);
-        let mut draws = Draws::new(6);
+        let mut draws = PathSampler::new(6);
         for (backend, query) in backends(&[&mesh]) {
             let leaks = |from: Vec3, to: Vec3| {
                 let ray = Ray::new(from.as_dvec3(), to - from);
@@ -197,7 +197,7 @@ fn a_closed_mesh_has_no_leaks() {
 
 #[test]
 fn the_interval_is_open_at_both_ends() {
-    let mut draws = Draws::new(7);
+    let mut draws = PathSampler::new(7);
     let mesh = soup(&mut draws, 300);
     let built = backends(&[&mesh]);
     let mut twice = 0;
@@ -251,7 +251,7 @@ fn an_empty_scene_has_no_hits() {
 /// A ray that leaves a surface does not meet it again, at any scale and ten thousand sizes from the origin.
 #[test]
 fn rays_that_leave_a_surface_do_not_hit_it() {
-    let mut draws = Draws::new(8);
+    let mut draws = PathSampler::new(8);
     let unit = soup(&mut draws, 200);
     for scale in [1e-6, 1e-3, 1.0, 1e3, 1e6] {
         for offset in [0.0, 1e4] {
@@ -290,7 +290,7 @@ fn the_two_backends_agree() {
     let rings = 60;
     let mesh = bumpy_sphere(rings);
     let [bvh, embree] = [Backend::Bvh, Backend::Embree].map(|b| query::build(b, &[&mesh]).unwrap());
-    let mut draws = Draws::new(9);
+    let mut draws = PathSampler::new(9);
     let count = 100_000;
     let (mut hits, mut others, mut one_sided) = (0, 0, 0);
     let rounding = 2.0 * reference::ROUNDINGS * f64::from(f32::EPSILON) * 3.5; // both may err; 3.5 is the farthest corner
@@ -322,7 +322,7 @@ fn the_two_backends_agree() {
 #[test]
 fn threads_do_not_disturb_each_other() {
     let mesh = bumpy_sphere(30);
-    let mut draws = Draws::new(10);
+    let mut draws = PathSampler::new(10);
     let rays = rays(&mut draws, 4000, 1.0, Vec3::ZERO);
     for (backend, query) in backends(&[&mesh]) {
         let alone: Vec<_> = rays.iter().map(|r| query.closest(r)).collect();
@@ -344,7 +344,7 @@ fn against_f64(count: u32) {
     let meshes = [&mesh];
     let share = 1.0 / f64::from(count);
     for (backend, query) in backends(&meshes) {
-        let mut draws = Draws::new(11);
+        let mut draws = PathSampler::new(11);
         let (mut hits, mut others, mut one_sided) = (0, 0, 0);
         let mut batch: Vec<Ray> = Vec::with_capacity(1000);
         for _ in 0..count / 1000 {
@@ -407,7 +407,7 @@ fn leaks(count: u32) {
     let mesh = bumpy_sphere(40);
     let query = backends(&[&mesh]);
     for (backend, query) in query {
-        let mut draws = Draws::new(12);
+        let mut draws = PathSampler::new(12);
         let mut leaks = 0;
         let mut batch: Vec<Ray> = Vec::with_capacity(1000);
         let mut hits = vec![None; 1000];
@@ -449,7 +449,7 @@ fn a_hundred_million_rays_do_not_leave_a_closed_mesh() {
 fn batches_from_one_point_are_the_rays_alone() {
     for scale in [1e-6, 1.0, 1e6] {
         let mesh = placed(&bumpy_sphere(30), scale, Vec3::ZERO);
-        let mut draws = Draws::new(13);
+        let mut draws = PathSampler::new(13);
         let mut rays = Vec::new();
         for forward in [Vec3::Z, -Vec3::X, Vec3::new(1.0, 1.0, 0.9), Vec3::new(-0.3, -1.0, 0.4)] {
             let eye = forward * -2.0 * scale;

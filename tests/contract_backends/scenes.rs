@@ -5,12 +5,12 @@ use marmor::math::{DVec3, Vec3, hash_combine, unit_f32};
 use marmor::query::Ray;
 
 /// Numbers from a seed.
-pub struct Draws {
+pub struct PathSampler {
     seed: u64,
     next: u64,
 }
 
-impl Draws {
+impl PathSampler {
     pub fn new(seed: u64) -> Self {
         Self { seed, next: 0 }
     }
@@ -52,7 +52,7 @@ pub fn mesh_of(triangles: impl IntoIterator<Item = [Vec3; 3]>) -> Mesh {
 }
 
 /// Triangles of many sizes in the cube from -1 to 1.
-pub fn soup(draws: &mut Draws, n: usize) -> Mesh {
+pub fn soup(draws: &mut PathSampler, n: usize) -> Mesh {
     mesh_of((0..n).map(|_| {
         let (at, size) = (draws.point(), 0.02 + 0.5 * draws.unit().powi(3));
         [0; 3].map(|_| at + draws.point() * size)
@@ -65,7 +65,7 @@ pub fn placed(mesh: &Mesh, scale: f32, offset: Vec3) -> Mesh {
 }
 
 /// From around the cube to a point in it, with directions of any length.
-pub fn rays(draws: &mut Draws, n: usize, scale: f32, offset: Vec3) -> Vec<Ray> {
+pub fn rays(draws: &mut PathSampler, n: usize, scale: f32, offset: Vec3) -> Vec<Ray> {
     (0..n)
         .map(|_| {
             let (from, to) = (draws.direction() * 2.5 * draws.unit() * scale + offset, draws.point() * scale + offset);

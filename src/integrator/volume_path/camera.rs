@@ -2,12 +2,12 @@
 
 use super::VolumePath;
 use super::cells::Cells;
-use super::connect::{Scratch, connect, walked_share};
-use super::draws::Draws;
-use super::interior::{Edge, Interior, MOST_SURFACES, Straight, Watch, survives};
+use super::connect::{Scratch, connect, walked_mis_weight};
+use super::draws::PathSampler;
+use super::interior::{Edge, Interior, MOST_SURFACES, Straight, WalkObserver, russian_roulette};
 use super::nesting::{self, Entry, Guide, Meets};
 use super::spectrum::Spectrum;
-use super::through::{drawn_light, share_by_chance, sun_share_by_chance};
+use super::through::{drawn_light, mis_weight_by_chance, sun_mis_weight_by_chance};
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
 use crate::light::{Arrival, Reference, emitted};
@@ -26,7 +26,7 @@ pub struct CameraPath<'a> {
     pub photons: &'a [Option<Cells>],
     pub scratch: &'a mut Scratch,
     pub tally: &'a mut Tally,
-    pub draws: Draws,
+    pub draws: PathSampler,
     /// Numbers of the sample's own, for what is asked of models.
     pub stream: PixelStream,
     /// Questions to models so far, but for the first surface's.
@@ -34,7 +34,7 @@ pub struct CameraPath<'a> {
     /// Mirror images that it is in, of those followed beside the rest.
     pub branches: u32,
     /// Numbers for connections, so that they do not disturb the walk's.
-    pub coins: Draws,
+    pub coins: PathSampler,
     pub spectrum: Spectrum,
     /// Share of lamps and suns that the next exit from the present body may meet: photons have the rest.
     pub direct: f32,
@@ -43,7 +43,7 @@ pub struct CameraPath<'a> {
     /// Times scattered in media.
     pub order: u32,
     /// Density [1/sr] of the present direction, where lights were asked for at the last surface, and that place.
-    pub by_bsdf: Option<(f32, Reference)>,
+    pub bsdf_pdf: Option<(f32, Reference)>,
     /// Whether the light of lights that it meets next is in a sum already: after a step in a near field, or a surface whose direct light
     /// was asked for apart.
     pub stepped: bool,
@@ -84,7 +84,7 @@ impl<'a> CameraPath<'a> {
         match self.view.rays.closest(ray) {
             None => self.meet_sky(ray.direction),
             Some(hit) => {
-                let share = self.share(&hit, ray.direction);
+                let share = self.mis_weight(&hit, ray.direction);
                 self.add_lamp(&hit, ray.direction, share);
             }
         }
@@ -119,7 +119,7 @@ impl<'a> CameraPath<'a> {
         let lights = &self.method.light.lights;
         let share = match lights.pdf_far(w) {
             by_table if by_table > 0.0 => {
-                let share = self.direct * self.share_of_sun(by_table);
+                let share = self.direct * self.mis_weight_of_sun(by_table);
                 if let (true, Some(number)) = (share > 0.0, lights.number_far(w)) {
                     self.tally.rays.lights.meet(number);
                 }
@@ -132,11 +132,11 @@ impl<'a> CameraPath<'a> {
 
     /// The share of a sun's light that a path meets by chance where suns, drawn with density `by_table` there, were asked
     /// for before.
-    fn share_of_sun(&self, by_table: f32) -> f32 {
-        match (self.by_bsdf, &self.left) {
-            (Some((by_bsdf, _)), _) => by_bsdf / (by_bsdf + by_table),
+    fn mis_weight_of_sun(&self, by_table: f32) -> f32 {
+        match (self.bsdf_pdf, &self.left) {
+            (Some((bsdf_pdf, _)), _) => bsdf_pdf / (bsdf_pdf + by_table),
             (None, Some((body, Some(straight)))) => {
-                sun_share_by_chance((body, self.method.through(body)), straight, by_table)
+                sun_mis_weight_by_chance((body, self.method.through(body)), straight, by_table)
             }
             (None, Some((body, None))) if self.leaves_specks_out(body) => {
                 let alone = self.method.through(body).is_some_and(|t| t.sun_alone(by_table));
@@ -154,9 +154,9 @@ impl<'a> CameraPath<'a> {
 
     /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision or the Lambertian
     /// surface before.
-    fn share(&self, hit: &Hit, direction: Vec3) -> f32 {
-        if let Some((by_bsdf, from)) = &self.by_bsdf {
-            return by_bsdf / (by_bsdf + self.method.light.lights.pdf_met(self.view.scene, from, hit, direction));
+    fn mis_weight(&self, hit: &Hit, direction: Vec3) -> f32 {
+        if let Some((bsdf_pdf, from)) = &self.bsdf_pdf {
+            return bsdf_pdf / (bsdf_pdf + self.method.light.lights.pdf_met(self.view.scene, from, hit, direction));
         }
         let Some((body, straight)) = &self.left else { return 1.0 };
         let Some(straight) = straight else {
@@ -164,7 +164,7 @@ impl<'a> CameraPath<'a> {
             return if self.leaves_specks_out(body) && alone() { 0.0 } else { 1.0 };
         };
         let lit = (*body, self.method.through(body));
-        share_by_chance(self.view.scene, &self.method.light.lights, lit, straight, hit, direction)
+        mis_weight_by_chance(self.view.scene, &self.method.light.lights, lit, straight, hit, direction)
     }
 
     /// Goes on from a surface that the camera sees.
@@ -179,7 +179,7 @@ impl<'a> CameraPath<'a> {
         let at = self.view.point(hit, direction);
         match self.view.scene.surface(hit.mesh) {
             Surface { emission: Some(_), .. } => {
-                let share = self.direct * self.share(hit, direction);
+                let share = self.direct * self.mis_weight(hit, direction);
                 self.add_lamp(hit, direction, share);
                 None
             }
@@ -200,7 +200,7 @@ impl<'a> CameraPath<'a> {
                 if self.other <= 0.0 {
                     return None;
                 }
-                self.by_bsdf = None;
+                self.bsdf_pdf = None;
                 let w = self
                     .view
                     .scene
@@ -257,7 +257,7 @@ impl<'a> CameraPath<'a> {
             if let Some(arrival) = lights.arrival(self.view.scene, group, at, u)
                 && self.open(&arrival)
             {
-                let share = arrival.share_beside(bsdf.pdf(at, wo, arrival.w));
+                let share = arrival.mis_weight_beside(bsdf.pdf(at, wo, arrival.w));
                 let light = bsdf.eval(at, wo, arrival.w) * arrival.irradiance * (share * self.other);
                 self.add(self.spectrum.value_outside() * light);
             }
@@ -265,13 +265,13 @@ impl<'a> CameraPath<'a> {
         let (before, mut after) = (self.spectrum.value_outside().max(), self.spectrum);
         after.scale(bsdf.albedo());
         let left = after.value_outside().max();
-        if left <= 0.0 || !survives(left / before, &mut self.spectrum, &mut self.draws) {
+        if left <= 0.0 || !russian_roulette(left / before, &mut self.spectrum, &mut self.draws) {
             return None;
         }
         let [u, v] = self.draws.pair();
         let next = bsdf.sample(at, wo, [u, v, 0.0])?;
         self.spectrum.scale(next.weight);
-        self.by_bsdf = (!bsdf.is_delta()).then(|| (next.pdf, Reference::surface(at)));
+        self.bsdf_pdf = (!bsdf.is_delta()).then(|| (next.pdf, Reference::surface(at)));
         (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
@@ -299,7 +299,7 @@ impl<'a> CameraPath<'a> {
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let (body, exit) = left?;
-        self.by_bsdf = None;
+        self.bsdf_pdf = None;
         self.left = Some((body, exit.straight));
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
@@ -317,7 +317,7 @@ struct Gather<'a, 'b> {
 struct Nested<'a, 'b>(&'a mut CameraPath<'b>);
 
 impl Guide for Nested<'_, '_> {
-    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl Watch + 'a {
+    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl WalkObserver + 'a {
         Gather { path: self.0, body, lit }
     }
 
@@ -326,8 +326,15 @@ impl Guide for Nested<'_, '_> {
     }
 }
 
-impl Watch for Gather<'_, '_> {
-    fn collision(&mut self, x: DVec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
+impl WalkObserver for Gather<'_, '_> {
+    fn collision(
+        &mut self,
+        x: DVec3,
+        w: Vec3,
+        edge: Option<Edge>,
+        spectrum: &mut Spectrum,
+        draws: &mut PathSampler,
+    ) -> bool {
         let (path, body) = (&mut *self.path, self.body);
         path.order += 1;
         if path.method.options.orders.none_above(path.order) || path.in_model(body) {
@@ -335,7 +342,7 @@ impl Watch for Gather<'_, '_> {
         }
         let photons = path.photons.get(body.object as usize).and_then(Option::as_ref);
         if let (Some(cells), Some(edge), true) = (photons, edge, path.direct > 0.0) {
-            let share = walked_share(cells, edge.length, edge.phase);
+            let share = walked_mis_weight(cells, edge.length, edge.phase);
             if share < 1.0 && draws.number() >= share {
                 path.direct = 0.0;
                 // What has been weighted up before goes on for certain: no weight is above the inverse of the chance.
@@ -415,7 +422,7 @@ pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
         path.trace(Ray::new(at.leave(w), w));
     }
     (path.spectrum, path.draws) = (spectrum, draws);
-    (path.direct, path.other, path.order, path.by_bsdf) = (1.0, 1.0, 0, None);
+    (path.direct, path.other, path.order, path.bsdf_pdf) = (1.0, 1.0, 0, None);
     if let Some(ray) = enter(path, entry, hit, direction) {
         path.trace(ray);
     }

@@ -30,7 +30,7 @@ const MOST_CELLS: f64 = 4e6;
 
 impl Cells {
     /// `photons` for queries of radius `reach` [unit], whose connections yield to the walk by `yielding` [unit²]: see
-    /// [`super::connect::walked_share`].
+    /// [`super::connect::walked_mis_weight`].
     pub fn new(photons: Vec<Photon>, reach: f32, yielding: f32) -> Self {
         let bounds = Aabb::around(photons.iter().map(|p| p.x));
         if photons.is_empty() {

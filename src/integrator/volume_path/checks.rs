@@ -1,8 +1,8 @@
 //! Photons and their connections, each alone, against sums that do not know them.
 
 use super::cells::{Cells, Photon};
-use super::connect::{Scratch, connect, walked_share};
-use super::draws::Draws;
+use super::connect::{Scratch, connect, walked_mis_weight};
+use super::draws::PathSampler;
 use super::*;
 use crate::math::{DVec3, GaussLegendre, Vec3};
 use crate::optics::{HenyeyGreenstein, transmittance};
@@ -111,7 +111,7 @@ fn connections_are_the_integral_over_photons() {
         let (each, rounds) = (900, 3000);
         let (mut sum, mut squares) = (0.0, 0.0);
         for round in 0..rounds {
-            let mut draws = Draws::new(&[], round);
+            let mut draws = PathSampler::new(&[], round);
             let photon = |i: u32| {
                 let r = reach * (i as f32 + draws.number()) / each as f32;
                 Photon { x: x + (draws.direction() * r).as_dvec3(), w: w_p, flux: Rgb::splat(r * r) }
@@ -133,7 +133,7 @@ fn connections_are_the_integral_over_photons() {
                 let cosine_p = -(0.6 * z + 0.8 * side * angle.cos());
                 let (p_v, p_p) = (phase.value(z), phase.value(cosine_p));
                 let along = |r: f64| {
-                    let share = 1.0 - f64::from(walked_share(&none, r as f32, p_v as f32));
+                    let share = 1.0 - f64::from(walked_mis_weight(&none, r as f32, p_v as f32));
                     p_v * p_p * (-10.0 * r).exp() * share
                 };
                 rule.integrate_panels(0.0, f64::from(reach) * (1.0 - 1e-6), 4, along)

@@ -2,7 +2,7 @@
 
 use super::Asked;
 use super::cells::Cells;
-use super::draws::Draws;
+use super::draws::PathSampler;
 use super::facets::Crossing;
 use super::interior::Interior;
 use crate::integrator::View;
@@ -24,7 +24,7 @@ pub struct Scratch {
 }
 
 /// The share of light over a straight flight of `length` from a collision whose phase function into that direction is
-/// `phase`, that is left to the walk; the photons have the rest, `1 - walked_share`. Beyond their reach all is left to
+/// `phase`, that is left to the walk; the photons have the rest, `1 - walked_mis_weight`. Beyond their reach all is left to
 /// the walk.
 ///
 /// With r the length and p the phase, the walk's share is c p / (r² + c p). A connection carries p/r², which grows without
@@ -32,7 +32,7 @@ pub struct Scratch {
 /// take: flux of a photon over radiance of the lamps. Any shares that add up to 1 for each path are unbiased, as long as
 /// they depend on the path alone.
 #[inline]
-pub fn walked_share(cells: &Cells, length: f32, phase: f32) -> f32 {
+pub fn walked_mis_weight(cells: &Cells, length: f32, phase: f32) -> f32 {
     if length >= cells.reach() {
         return 1.0;
     }
@@ -52,7 +52,7 @@ pub fn connect(
     cells: &Cells,
     (x, w): (DVec3, Vec3),
     scratch: &mut Scratch,
-    coins: &mut Draws,
+    coins: &mut PathSampler,
     tally: &mut WalkTally,
 ) -> Rgb {
     let Scratch { rows, found, .. } = scratch;

@@ -7,14 +7,14 @@ const SPREAD: usize = 4;
 
 /// A pure function of (key, count): two paths with other keys share nothing.
 #[derive(Clone, Debug)]
-pub struct Draws {
+pub struct PathSampler {
     spread: [f32; SPREAD],
     given: u64,
     key: u64,
     drawn: u64,
 }
 
-impl Draws {
+impl PathSampler {
     /// Up to four `spread` numbers come first; the others follow from `key`.
     pub fn new(spread: &[f32], key: u64) -> Self {
         let mut first = [0.0; SPREAD];
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn spread_numbers_come_first_and_keys_differ() {
         let take = |key| {
-            let mut draws = Draws::new(&[0.1, 0.2, 0.3, 0.4], key);
+            let mut draws = PathSampler::new(&[0.1, 0.2, 0.3, 0.4], key);
             (0..8).map(|_| draws.number()).collect::<Vec<_>>()
         };
         assert_eq!(take(1)[..4], [0.1, 0.2, 0.3, 0.4]);
@@ -96,7 +96,7 @@ mod tests {
     /// First and second moments of 10^5 directions, to 6 standard errors.
     #[test]
     fn directions_are_unit_and_lean_nowhere() {
-        let mut draws = Draws::new(&[], 3);
+        let mut draws = PathSampler::new(&[], 3);
         let n = 100_000;
         let (mut mean, mut square) = (Vec3::ZERO, Vec3::ZERO);
         for _ in 0..n {

@@ -23,13 +23,13 @@ pub struct Entering {
     pub light: Option<usize>,
     /// It arrives if nothing is hit on this ray; `None` where that is known.
     pub shadow: Option<Ray>,
-    /// Share of each of the [`Emission::ways`] in its density; zeros under a sun.
+    /// Share of each of the [`EmissionSampler::ways`] in its density; zeros under a sun.
     pub by: [f32; 3],
 }
 
 /// How pairs of a point of the body and a point of a light are drawn.
 #[derive(Clone, Copy, Debug)]
-pub struct Emission {
+pub struct EmissionSampler {
     /// The body as a whole, for which lamps are chosen before there is a point of it.
     pub around: Reference,
     /// Share of the pairs whose light is a sun.
@@ -41,7 +41,7 @@ pub struct Emission {
     pub ways: [f32; 3],
 }
 
-impl Emission {
+impl EmissionSampler {
     /// One pair, before it is known whether anything stands between; `None` where no light comes that way.
     pub fn sample(
         &self,

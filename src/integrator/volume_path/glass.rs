@@ -4,8 +4,8 @@
 //! shadow rays meet are met by none of these.
 
 use super::connect::Scratch;
-use super::draws::Draws;
-use super::interior::{Edge, Interior, Watch};
+use super::draws::PathSampler;
+use super::interior::{Edge, Interior, WalkObserver};
 use super::nesting::{self, Entry, Guide, Meets, Stack};
 use super::spectrum::Spectrum;
 use super::{VolumePath, interior};
@@ -36,7 +36,7 @@ pub fn camera_in(scene: &Scene) -> Stack {
 struct Passing<'a>(&'a VolumePath);
 
 impl Guide for Passing<'_> {
-    fn watch<'a>(&'a mut self, _: &'a Interior, _: bool) -> impl Watch + 'a {
+    fn watch<'a>(&'a mut self, _: &'a Interior, _: bool) -> impl WalkObserver + 'a {
         Ends
     }
 
@@ -48,8 +48,8 @@ impl Guide for Passing<'_> {
 /// A walk that no collision is expected in.
 struct Ends;
 
-impl Watch for Ends {
-    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut Draws) -> bool {
+impl WalkObserver for Ends {
+    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut PathSampler) -> bool {
         false
     }
 }
@@ -90,7 +90,7 @@ impl VolumePath {
         view: View<'_>,
         (hit, direction): (&Hit, Vec3),
         flux: Rgb,
-        draws: &mut Draws,
+        draws: &mut PathSampler,
         tally: &mut Tally,
     ) -> Option<(Ray, Rgb)> {
         let body = self.bodies[hit.mesh as usize].as_ref()?;

@@ -1,6 +1,6 @@
 //! A body of the world from the inside: flights, collisions, the boundary, until light leaves.
 
-use super::draws::Draws;
+use super::draws::PathSampler;
 use super::facets::Bend;
 use super::spectrum::{Coefficients, Spectrum};
 use crate::geometry::{Clearance, SurfacePoint, Union};
@@ -55,17 +55,24 @@ pub struct Edge {
 }
 
 /// Who watches a path inside a body.
-pub trait Watch {
+pub trait WalkObserver {
     /// Light that travelled along `w` is scattered at `x`, by the path's weight `spectrum` (the collision's albedo is in
     /// it). `edge` is the straight flight from the collision before, if no surface lay between. False ends the path.
-    fn collision(&mut self, x: DVec3, w: Vec3, edge: Option<Edge>, spectrum: &mut Spectrum, draws: &mut Draws) -> bool;
+    fn collision(
+        &mut self,
+        x: DVec3,
+        w: Vec3,
+        edge: Option<Edge>,
+        spectrum: &mut Spectrum,
+        draws: &mut PathSampler,
+    ) -> bool;
 
     /// A lamp inside the body ends the path, which came to it along `w`.
     fn lamp(&mut self, _hit: &Hit, _w: Vec3, _spectrum: &Spectrum) {}
 }
 
 /// Where and how a path left a body.
-pub struct Exit {
+pub struct WalkExit {
     /// The point, its normals outwards.
     pub at: SurfacePoint,
     /// Refracted direction outside.
@@ -171,7 +178,7 @@ impl Interior {
     }
 
     #[inline]
-    pub fn scatter(&self, w: Vec3, draws: &mut Draws) -> Vec3 {
+    pub fn scatter(&self, w: Vec3, draws: &mut PathSampler) -> Vec3 {
         if self.phase.g == 0.0 {
             return draws.direction();
         }
@@ -215,10 +222,10 @@ impl Interior {
         view: View<'_>,
         (mut from, mut w): (DVec3, Vec3),
         spectrum: &mut Spectrum,
-        draws: &mut Draws,
-        watch: &mut impl Watch,
+        draws: &mut PathSampler,
+        watch: &mut impl WalkObserver,
         tally: &mut WalkTally,
-    ) -> Option<Exit> {
+    ) -> Option<WalkExit> {
         tally.walks += 1;
         let whole = spectrum.value(&self.medium).max();
         let (mut collisions, mut bounces, mut edge) = (0_u32, 0_u32, None);
@@ -235,7 +242,7 @@ impl Interior {
                     }
                     if collisions % self.patience == 0 {
                         let left = spectrum.value(&self.medium).max() / whole;
-                        if !survives(left / ROULETTE_BELOW, spectrum, draws) {
+                        if !russian_roulette(left / ROULETTE_BELOW, spectrum, draws) {
                             return None;
                         }
                     }
@@ -250,7 +257,7 @@ impl Interior {
                     if cosines[1] > 0.0 {
                         spectrum.leave(&self.medium);
                         let straight = edge.map(|phase| Straight { from, phase, length: t, cosines });
-                        return Some(Exit { at, w: next, straight });
+                        return Some(WalkExit { at, w: next, straight });
                     }
                     w = next;
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);
@@ -260,7 +267,7 @@ impl Interior {
                     let before = spectrum.value(&self.medium).max();
                     spectrum.scale(albedo);
                     let left = spectrum.value(&self.medium).max();
-                    if left <= 0.0 || !survives(left / before, spectrum, draws) {
+                    if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
                         return None;
                     }
                     w = cosine_hemisphere(at.n_geometric, draws.pair());
@@ -286,7 +293,7 @@ impl Interior {
 
 /// Roulette: true with probability `chance`, and then the path is worth 1/`chance` more.
 #[inline]
-pub fn survives(chance: f32, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
+pub fn russian_roulette(chance: f32, spectrum: &mut Spectrum, draws: &mut PathSampler) -> bool {
     if chance >= 1.0 {
         return true;
     }

@@ -38,7 +38,7 @@ use crate::words::short;
 use camera::{CameraPath, both_parts, enter};
 use cells::Cells;
 pub(super) use connect::Scratch;
-pub(super) use draws::Draws;
+pub(super) use draws::PathSampler;
 use interior::Interior;
 pub use interior::MOST_SURFACES;
 pub(super) use modelled::Modelled;
@@ -46,7 +46,7 @@ use nesting::{Entry, Stack};
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
-use through::Through;
+use through::RefractedNee;
 
 /// Options of [`VolumePath`].
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +75,7 @@ pub struct VolumePath {
     light: DirectLight,
     /// One for each object; `None` where it is not translucent.
     bodies: Vec<Option<Interior>>,
-    throughs: Vec<Option<Through>>,
+    throughs: Vec<Option<RefractedNee>>,
     sources: Vec<Option<Source>>,
     /// Chance that a path goes on for light other than that of lamps and suns on the body itself, once photons have that.
     persistence: f32,
@@ -229,7 +229,7 @@ impl VolumePath {
         let own = stream;
         let ([a, b], [c, d]) = (stream.next_2d(), stream.next_2d());
         let ([e, f], [g, h]) = (stream.next_2d(), stream.next_2d());
-        let draws = Draws::new(&[a, b, c, d], stream.key());
+        let draws = PathSampler::new(&[a, b, c, d], stream.key());
         let coins = draws.fork_with(&[e, f, g, h], 0);
         self.path_by((draws, coins, own), (view, photons), scratch, tally)
     }
@@ -237,7 +237,7 @@ impl VolumePath {
     /// The same by given numbers: of the path, of its connections, of what it asks models for.
     fn path_by<'a>(
         &'a self,
-        (mut draws, coins, stream): (Draws, Draws, PixelStream),
+        (mut draws, coins, stream): (PathSampler, PathSampler, PixelStream),
         (view, photons): (View<'a>, &'a [Option<Cells>]),
         scratch: &'a mut Scratch,
         tally: &'a mut Tally,
@@ -257,7 +257,7 @@ impl VolumePath {
             direct: 1.0,
             other: 1.0,
             order: 0,
-            by_bsdf: None,
+            bsdf_pdf: None,
             stepped: false,
             left: None,
             radiance: Rgb::BLACK,
@@ -285,7 +285,7 @@ impl VolumePath {
     }
 
     /// How lamps and suns are asked for at collisions in `body`.
-    fn through(&self, body: &Interior) -> Option<&Through> {
+    fn through(&self, body: &Interior) -> Option<&RefractedNee> {
         self.throughs[body.object as usize].as_ref()
     }
 
@@ -340,10 +340,10 @@ fn endless(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior
 }
 
 /// How lamps and suns are asked for in each of the bodies that scatter.
-fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Interior>]) -> Vec<Option<Through>> {
+fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Interior>]) -> Vec<Option<RefractedNee>> {
     let of = |body: &Option<Interior>| {
         let body = body.as_ref().filter(|body| body.medium.albedo.max() > 0.0)?;
-        Through::new(scene, lights, body.object, body.eta, body.phase.g as f32)
+        RefractedNee::new(scene, lights, body.object, body.eta, body.phase.g as f32)
     };
     bodies.iter().map(of).collect()
 }

@@ -2,9 +2,9 @@
 
 use super::camera::{CameraPath, enter};
 use super::connect::Scratch;
-use super::draws::Draws;
+use super::draws::PathSampler;
 use super::glass;
-use super::interior::{Edge, Interior, MOST_SURFACES, Watch, survives};
+use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
 use super::{Asked, VolumePath, VolumePathOptions, endless, throughs};
@@ -38,8 +38,8 @@ pub struct Modelled {
 /// Ends a walk at its next collision but for so many.
 struct AtMost(u32);
 
-impl Watch for AtMost {
-    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut Draws) -> bool {
+impl WalkObserver for AtMost {
+    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut PathSampler) -> bool {
         let goes_on = self.0 > 0;
         self.0 = self.0.saturating_sub(1);
         goes_on
@@ -130,7 +130,7 @@ impl VolumePath {
         view: View<'_>,
         hit: &Hit,
         direction: Vec3,
-        draws: Draws,
+        draws: PathSampler,
         tally: &mut Tally,
     ) -> Rgb {
         let mut scratch = Scratch::default();
@@ -153,7 +153,7 @@ impl VolumePath {
         object: u32,
         from: (DVec3, Vec3),
         flux: Rgb,
-        draws: &mut Draws,
+        draws: &mut PathSampler,
         tally: &mut Tally,
     ) -> Option<(Ray, Rgb)> {
         let body = self.body(object)?;
@@ -186,7 +186,7 @@ impl CameraPath<'_> {
             self.trace(Ray::new(at.leave(w), w));
         }
         if let Some(plan) = &model.near {
-            (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws.fork(2), None);
+            (self.spectrum, self.draws, self.bsdf_pdf) = (spectrum, draws.fork(2), None);
             self.spectrum.scale(Rgb::splat(passed));
             if let Some(ray) = self.step(plan, &at, w) {
                 self.trace(ray);
@@ -195,14 +195,14 @@ impl CameraPath<'_> {
         }
         let Some(body) = self.method.body(hit.mesh) else { return };
         if model.clear {
-            (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws.fork(3), None);
+            (self.spectrum, self.draws, self.bsdf_pdf) = (spectrum, draws.fork(3), None);
             self.spectrum.scale(Rgb::splat(passed));
             if let Some(ray) = refract(w, n, body.eta).and_then(|inside| self.straight(body, &at, inside)) {
                 self.trace(ray);
             }
         }
         if model.once {
-            (self.spectrum, self.draws, self.by_bsdf) = (spectrum, draws, None);
+            (self.spectrum, self.draws, self.bsdf_pdf) = (spectrum, draws, None);
             self.order = 0;
             if let Some(ray) = enter(self, Entry::alone(body), hit, direction).filter(|_| self.order > 0) {
                 self.trace(ray);
@@ -214,7 +214,7 @@ impl CameraPath<'_> {
     /// followed by itself while the path has weight, else by the chance of it.
     pub fn meet_modelled(&mut self, hit: &Hit, at: &SurfacePoint, direction: Vec3) -> Option<Ray> {
         let model = self.method.modelled[hit.mesh as usize].as_ref()?;
-        self.by_bsdf = None;
+        self.bsdf_pdf = None;
         let (n, w) = (at.n_geometric, -direction);
         // No light enters by the back of a face, and paths end there.
         if self.view.outwards(hit).n_geometric.dot(w) <= 0.0 {
@@ -230,7 +230,7 @@ impl CameraPath<'_> {
             self.spectrum.scale(Rgb::splat(mirrored));
             self.draws = draws.fork(1);
             self.trace(Ray::new(at.leave(away), away));
-            (self.spectrum, self.draws, self.by_bsdf, self.left) = (spectrum, draws.fork(2), None, None);
+            (self.spectrum, self.draws, self.bsdf_pdf, self.left) = (spectrum, draws.fork(2), None, None);
             self.stepped = false;
             self.branches -= 1;
             self.spectrum.scale(Rgb::splat(1.0 - mirrored));
@@ -280,7 +280,7 @@ impl CameraPath<'_> {
             let before = self.spectrum.value_outside().max();
             self.spectrum.scale(body.medium.sigma_t.map(|s| (-s * hit.t).exp()));
             let left = self.spectrum.value_outside().max();
-            if left <= 0.0 || !survives(left / before / FAINT, &mut self.spectrum, &mut self.draws) {
+            if left <= 0.0 || !russian_roulette(left / before / FAINT, &mut self.spectrum, &mut self.draws) {
                 return None;
             }
             let next = Boundary { eta: body.eta }.sample(&at, -w, [self.draws.number(), 0.0, 0.0])?.wi;
@@ -309,11 +309,11 @@ impl CameraPath<'_> {
         let before = self.spectrum.value_outside().max();
         self.spectrum.scale(passed);
         let left = self.spectrum.value_outside().max();
-        if left <= 0.0 || !survives(left / before, &mut self.spectrum, &mut self.draws) {
+        if left <= 0.0 || !russian_roulette(left / before, &mut self.spectrum, &mut self.draws) {
             return None;
         }
         self.left = None;
-        self.by_bsdf = None;
+        self.bsdf_pdf = None;
         self.stepped = true;
         Some(Ray::new(entry.leave(w), w))
     }

@@ -8,8 +8,10 @@
 //!
 //! Faces that lie in each other are crossed at once, by a table: rays could not tell which comes first.
 
-use super::draws::Draws;
-use super::interior::{Edge, Exit, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, Watch, survives};
+use super::draws::PathSampler;
+use super::interior::{
+    Edge, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, WalkExit, WalkObserver, russian_roulette,
+};
 use super::spectrum::Spectrum;
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
@@ -157,11 +159,11 @@ impl<'a> Entry<'a> {
     }
 }
 
-/// Who watches a path through bodies: makes a [`Watch`] for the body that the path is in; `lit` says whether lamps may be asked for
+/// Who watches a path through bodies: makes a [`WalkObserver`] for the body that the path is in; `lit` says whether lamps may be asked for
 /// at collisions there.
 pub trait Guide {
     /// For `body`.
-    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl Watch + 'a;
+    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl WalkObserver + 'a;
 
     /// How paths meet the body of object number `object`.
     fn meets(&self, object: u32) -> Meets;
@@ -209,10 +211,10 @@ pub fn walk<'a>(
     bodies: &'a [Option<Interior>],
     ((mut stack, mut last), mut from, mut w): (Around, DVec3, Vec3),
     spectrum: &mut Spectrum,
-    draws: &mut Draws,
+    draws: &mut PathSampler,
     guide: &mut impl Guide,
     tally: &mut WalkTally,
-) -> Option<(&'a Interior, Exit)> {
+) -> Option<(&'a Interior, WalkExit)> {
     let nests = view.scene.nests();
     let body_of = |stack: &Stack| bodies[stack.top()? as usize].as_ref();
     let mut body = body_of(&stack)?;
@@ -278,7 +280,7 @@ pub fn walk<'a>(
                 let (at, before) = (at.facing(-w), spectrum.value(&body.medium).max());
                 spectrum.scale(albedo);
                 let left = spectrum.value(&body.medium).max();
-                if left <= 0.0 || !survives(left / before, spectrum, draws) {
+                if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
                     return None;
                 }
                 w = cosine_hemisphere(at.n_geometric, draws.pair());
@@ -318,7 +320,7 @@ pub fn walk<'a>(
             // Lamps are asked for over such lines: see `Guide`.
             let asked = stack.is_only(body.object) && faces.margin == 0.0;
             let straight = phase.filter(|_| asked).map(|phase| Straight { from, phase, length: hit.t, cosines });
-            return Some((body, Exit { at, w: to, straight }));
+            return Some((body, WalkExit { at, w: to, straight }));
         };
         (from, w, phase) = (at.leave(to), to, None);
         (body, stack) = (next, after);
@@ -329,8 +331,8 @@ pub fn walk<'a>(
 const SURFACES_BETWEEN_LOOKS: u32 = 8;
 
 /// Roulette by what is left of the weight that a path came with.
-fn goes_on(body: &Interior, whole: f32, spectrum: &mut Spectrum, draws: &mut Draws) -> bool {
-    survives(spectrum.value(&body.medium).max() / whole / ROULETTE_BELOW, spectrum, draws)
+fn goes_on(body: &Interior, whole: f32, spectrum: &mut Spectrum, draws: &mut PathSampler) -> bool {
+    russian_roulette(spectrum.value(&body.medium).max() / whole / ROULETTE_BELOW, spectrum, draws)
 }
 
 /// n behind the face over n before it, where light along `w` comes from a medium of index `here` into one of index `there`.

@@ -1,8 +1,8 @@
 //! One beam into one body and where it comes out: the walk of the renderer alone, for profiles and totals.
 
 use super::VolumePath;
-use super::draws::Draws;
-use super::interior::{Edge, Watch};
+use super::draws::PathSampler;
+use super::interior::{Edge, WalkObserver};
 use super::spectrum::Spectrum;
 use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
@@ -24,8 +24,8 @@ pub struct Left {
 /// Counts collisions.
 struct Count(u32);
 
-impl Watch for Count {
-    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut Draws) -> bool {
+impl WalkObserver for Count {
+    fn collision(&mut self, _: DVec3, _: Vec3, _: Option<Edge>, _: &mut Spectrum, _: &mut PathSampler) -> bool {
         self.0 += 1;
         true
     }
@@ -45,7 +45,7 @@ impl VolumePath {
         tally: &mut WalkTally,
     ) -> Option<Left> {
         let body = self.bodies.get(object as usize)?.as_ref()?;
-        let mut draws = Draws::new(&[], key);
+        let mut draws = PathSampler::new(&[], key);
         let (mut spectrum, mut count) = (Spectrum::new(Rgb::WHITE, u), Count(0));
         let exit = body.walk(view, (x, w), &mut spectrum, &mut draws, &mut count, tally)?;
         Some(Left { x: exit.at.x, w: exit.w, weight: spectrum.value_outside(), order: count.0 })

@@ -1,9 +1,9 @@
 //! Light traced from lamps and suns into a body: where it is scattered, for paths from the camera to connect to.
 
 use super::cells::{Cells, Photon};
-use super::draws::Draws;
-use super::emission::{Emission, Entering};
-use super::interior::{Edge, Interior, Watch};
+use super::draws::PathSampler;
+use super::emission::{EmissionSampler, Entering};
+use super::interior::{Edge, Interior, WalkObserver};
 use super::spectrum::Spectrum;
 use crate::integrator::View;
 use crate::light::{Group, Lights, Reference};
@@ -35,7 +35,7 @@ pub struct Source {
 /// How photons start, and how far their connections yield to the walk: see [`super::connect`].
 #[derive(Clone, Copy, Debug)]
 struct Plan {
-    emission: Emission,
+    emission: EmissionSampler,
     yielding: f32,
 }
 
@@ -47,7 +47,7 @@ const BYTES_PER_PHOTON: f64 = 3.7 * size_of::<Photon>() as f64;
 const CHUNK: u64 = 64;
 /// Photons of the estimate that makes a [`Plan`].
 const PILOT: u64 = 1024;
-/// Each of the [`Emission::ways`] has at least this share before they are made to add up to 1: what bounds a photon's power.
+/// Each of the [`EmissionSampler::ways`] has at least this share before they are made to add up to 1: what bounds a photon's power.
 const LEAST_WAY: f32 = 0.02;
 /// Beside lamps, suns have at least this share of the photons, and at most all but this.
 const LEAST_SHARE: f32 = 0.05;
@@ -69,7 +69,7 @@ impl Source {
     fn look(&self, view: View<'_>, body: &Interior, lights: &Lights) -> Option<Plan> {
         let pilot = CacheStream::new(Points::Sobol, self.seed, 1);
         let around = Reference::body(&self.body.bounds);
-        let flux_by = |emission: Emission| {
+        let flux_by = |emission: EmissionSampler| {
             let (mut flux, mut by) = (0.0, [0.0; 3]);
             for i in 0..PILOT {
                 let (pick, u) = pilot.numbers(i);
@@ -82,12 +82,15 @@ impl Source {
             (flux, by)
         };
         let (from_lamps, by) = if lights.has_emitters() {
-            flux_by(Emission { around, from_suns: 0.0, ways: [1.0 / 3.0; 3] })
+            flux_by(EmissionSampler { around, from_suns: 0.0, ways: [1.0 / 3.0; 3] })
         } else {
             (0.0, [1.0; 3])
         };
-        let from_suns =
-            if lights.has_suns() { flux_by(Emission { around, from_suns: 1.0, ways: [1.0 / 3.0; 3] }).0 } else { 0.0 };
+        let from_suns = if lights.has_suns() {
+            flux_by(EmissionSampler { around, from_suns: 1.0, ways: [1.0 / 3.0; 3] }).0
+        } else {
+            0.0
+        };
         // Each way by the part of the flux that is its own under equal shares.
         let least = by.map(|flux| (flux / from_lamps.max(f32::MIN_POSITIVE)).max(LEAST_WAY));
         let ways = least.map(|share| share / least.iter().sum::<f32>());
@@ -103,7 +106,7 @@ impl Source {
         let per_photon =
             per(from_lamps, lights.mean_radiance(Group::Near)) + per(from_suns, lights.mean_radiance(Group::Far));
         let yielding = YIELD * per_photon / (4.0 * PI * body.eta * body.eta);
-        let emission = Emission { around, from_suns: sunny, ways };
+        let emission = EmissionSampler { around, from_suns: sunny, ways };
         (yielding.is_normal()).then_some(Plan { emission, yielding })
     }
 
@@ -188,7 +191,7 @@ impl Source {
             return;
         }
         let key = hash_combine(turn.seed, number);
-        let mut draws = Draws::new(&numbers.1[5..], key);
+        let mut draws = PathSampler::new(&numbers.1[5..], key);
         let coins = draws.fork(0);
         let mut spectrum = Spectrum::new(flux * (1.0 / self.count as f32), draws.number());
         let mut deposit = Deposit { body, photons, reach: self.reach, coins };
@@ -201,11 +204,11 @@ struct Deposit<'a> {
     body: &'a Interior,
     photons: &'a mut Vec<Photon>,
     reach: f32,
-    coins: Draws,
+    coins: PathSampler,
 }
 
-impl Watch for Deposit<'_> {
-    fn collision(&mut self, x: DVec3, w: Vec3, _: Option<Edge>, spectrum: &mut Spectrum, _: &mut Draws) -> bool {
+impl WalkObserver for Deposit<'_> {
+    fn collision(&mut self, x: DVec3, w: Vec3, _: Option<Edge>, spectrum: &mut Spectrum, _: &mut PathSampler) -> bool {
         let beyond = self.body.clearance.at(x) - self.reach;
         let chance = if beyond > 0.0 { (-beyond * self.body.least_extinction).exp().max(LEAST_CHANCE) } else { 1.0 };
         if chance >= 1.0 || self.coins.number() < chance {

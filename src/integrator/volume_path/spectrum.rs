@@ -134,7 +134,7 @@ impl Spectrum {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::integrator::volume_path::draws::Draws;
+    use crate::integrator::volume_path::draws::PathSampler;
 
     fn medium() -> Coefficients {
         Coefficients::new(&Medium { sigma_s: Rgb([0.7, 2.0, 9.0]), sigma_a: Rgb([0.0, 0.5, 0.1]), g: 0.0, eta: 1.0 })
@@ -148,7 +148,7 @@ mod tests {
         let n = 400_000;
         let mut passed = [[0.0_f64; 2]; 3];
         for i in 0..n {
-            let mut draws = Draws::new(&[i as f32 / n as f32], i);
+            let mut draws = PathSampler::new(&[i as f32 / n as f32], i);
             let mut path = Spectrum::new(Rgb::WHITE, draws.number());
             // Three flights, then up to the length 1.
             let (mut length, mut hits) = (0.0, 0);

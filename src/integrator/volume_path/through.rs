@@ -1,6 +1,6 @@
 //! Light from a lamp or a sun straight to a collision, through every facet of the boundary that refracts it there.
 
-use super::draws::Draws;
+use super::draws::PathSampler;
 use super::facets::{Bend, Crossing, Facets, Towards};
 use super::interior::{Interior, Straight};
 use super::spectrum::Spectrum;
@@ -14,7 +14,7 @@ use crate::tally::{Tally, WalkTally};
 use std::f32::consts::PI;
 
 /// What a body needs to be asked for the light of lamps and suns.
-pub struct Through {
+pub struct RefractedNee {
     facets: Facets,
     /// The body's box.
     bounds: Aabb,
@@ -31,10 +31,10 @@ pub struct Through {
 const MOST_TRACED: usize = 3;
 /// Every crossing within this many mean free paths is asked for; those beyond by chance.
 const SURE: f32 = 1.0;
-/// A lamp is [`Through::alone`] if no sample of its points is worth more than this share of its radiance.
+/// A lamp is [`RefractedNee::alone`] if no sample of its points is worth more than this share of its radiance.
 const ALONE_BELOW: f32 = 0.25;
 
-impl Through {
+impl RefractedNee {
     /// For the object number `object` with refractive index `eta` and mean cosine `g`. `None` without facets, or without lamps
     /// and suns.
     pub fn new(scene: &Scene, lights: &Lights, object: u32, eta: f32, g: f32) -> Option<Self> {
@@ -77,11 +77,11 @@ struct Densities {
 }
 
 impl Densities {
-    fn share_by_point(&self) -> f32 {
+    fn mis_weight_by_point(&self) -> f32 {
         self.by_point / (self.by_point + self.by_chance)
     }
 
-    fn share_by_chance(&self) -> f32 {
+    fn mis_weight_by_chance(&self) -> f32 {
         self.by_chance / (self.by_point + self.by_chance)
     }
 }
@@ -99,11 +99,11 @@ fn density_outside(body: &Interior, bend: &Bend, phase: f32) -> f32 {
 /// chance, with its inverse as weight. Light reflected inside on its way is not in it.
 pub fn drawn_light(
     view: View<'_>,
-    ((body, through), lights, group): ((&Interior, &Through), &Lights, Group),
+    ((body, through), lights, group): ((&Interior, &RefractedNee), &Lights, Group),
     (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
     found: &mut Vec<Crossing>,
-    draws: &mut Draws,
+    draws: &mut PathSampler,
     tally: &mut Tally,
 ) -> Rgb {
     let u = [draws.number(), draws.number(), draws.number()];
@@ -114,7 +114,7 @@ pub fn drawn_light(
 }
 
 /// How far away facets are looked for; `None` where no surface is that near.
-fn horizon(body: &Interior, x: DVec3, draws: &mut Draws) -> Option<f32> {
+fn horizon(body: &Interior, x: DVec3, draws: &mut PathSampler) -> Option<f32> {
     let horizon = (SURE - (1.0 - draws.number()).ln()) / body.least_extinction;
     (body.clearance.at(x) <= horizon).then_some(horizon)
 }
@@ -123,12 +123,12 @@ fn horizon(body: &Interior, x: DVec3, draws: &mut Draws) -> Option<f32> {
 #[allow(clippy::too_many_arguments)] // what both callers have
 fn arriving(
     view: View<'_>,
-    (body, through): (&Interior, &Through),
+    (body, through): (&Interior, &RefractedNee),
     drawn: &LightSample,
     (x, w): (DVec3, Vec3),
     horizon: f32,
     found: &mut Vec<Crossing>,
-    draws: &mut Draws,
+    draws: &mut PathSampler,
     tally: &mut Tally,
 ) -> Rgb {
     let decay = body.least_extinction;
@@ -189,7 +189,7 @@ fn line(body: &Interior, crossing: &Crossing, drawn: &LightSample, phase: f32, a
         LightEnd::Direction(_) => density_outside(body, &crossing.bend, phase),
     };
     let densities = Densities { by_point: drawn.pdf as f32, by_chance };
-    densities.by_chance / densities.by_point * if alone { 1.0 } else { densities.share_by_point() }
+    densities.by_chance / densities.by_point * if alone { 1.0 } else { densities.mis_weight_by_point() }
 }
 
 /// Whether nothing stands between `x` and what was drawn.
@@ -232,10 +232,10 @@ fn is_open(
 
 /// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
 /// a collision, that [`drawn_light`] leaves to it.
-pub fn share_by_chance(
+pub fn mis_weight_by_chance(
     scene: &Scene,
     lights: &Lights,
-    (body, through): (&Interior, Option<&Through>),
+    (body, through): (&Interior, Option<&RefractedNee>),
     straight: &Straight,
     hit: &Hit,
     direction: Vec3,
@@ -249,17 +249,21 @@ pub fn share_by_chance(
     let focus = bend.focus(body.eta.into()) as f32 * normal.dot(direction).abs();
     let passed = transmittance(1.0 / body.eta, bend.cosines[0] as f32);
     let by_point = lights.pdf_point(&Reference::inside(straight.from, &through.bounds), hit.mesh);
-    Densities { by_point, by_chance: straight.phase * passed * focus }.share_by_chance()
+    Densities { by_point, by_chance: straight.phase * passed * focus }.mis_weight_by_chance()
 }
 
 /// The same for a sun, drawn with density `by_point` [1/sr], and [`drawn_light`].
-pub fn sun_share_by_chance((body, through): (&Interior, Option<&Through>), straight: &Straight, by_point: f32) -> f32 {
+pub fn sun_mis_weight_by_chance(
+    (body, through): (&Interior, Option<&RefractedNee>),
+    straight: &Straight,
+    by_point: f32,
+) -> f32 {
     let Some(through) = through else { return 1.0 };
     if through.sun_alone(by_point) {
         return 0.0;
     }
     let by_chance = density_outside(body, &straight.bend(f32::INFINITY), straight.phase);
-    Densities { by_point, by_chance }.share_by_chance()
+    Densities { by_point, by_chance }.mis_weight_by_chance()
 }
 
 #[cfg(test)]
@@ -314,7 +318,7 @@ mod tests {
         let (mut points, mut chance) = (Mean::default(), Mean::default());
         let (mut found, mut tally) = (Vec::new(), Tally::default());
         for i in 0..samples {
-            let mut draws = Draws::new(&[], i);
+            let mut draws = PathSampler::new(&[], i);
             // Somewhere in the ball, more often close to its surface.
             let x = (draws.direction() * (0.95 * (1.0 - draws.number().powi(2)))).as_dvec3() - scene.centre;
             let w = draws.direction();
@@ -330,7 +334,7 @@ mod tests {
                 let phase = body.phase(w, to);
                 let straight = Straight { from: x, phase, length, cosines: [mu, out.dot(at.n_geometric)] };
                 let light = emitted(&scene, &hit, out)[0] * passed;
-                lucky = [light, light * share_by_chance(&scene, lights, (body, through), &straight, &hit, out)];
+                lucky = [light, light * mis_weight_by_chance(&scene, lights, (body, through), &straight, &hit, out)];
             }
             chance.add(lucky[0]);
             // Far less noisy, but slower.
@@ -385,7 +389,7 @@ mod tests {
             let from = ((body, method.through(body).unwrap()), lights, Group::Near);
             let (mut found, mut tally, mut most) = (Vec::new(), Tally::default(), 0.0_f32);
             for i in 0..100_000 {
-                let mut draws = Draws::new(&[], i);
+                let mut draws = PathSampler::new(&[], i);
                 let x = draws.direction().as_dvec3() * 0.98 - scene.centre;
                 let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
                 let w = draws.direction();
