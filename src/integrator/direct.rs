@@ -68,13 +68,7 @@ impl Integrator for Direct {
             "any-hit shadow rays",
             format!("{} per camera ray and kind of light", self.light.samples),
         ));
-        let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
-        let why = if translucent {
-            "`direct` shows translucent surfaces as Lambertian ones of the same reflectance"
-        } else {
-            "no translucent material"
-        };
-        parts.push(Part::left_out("area tables and sample cache", why));
+        parts.push(Part::no_cache(scene, "direct"));
         parts
     }
 }

@@ -252,7 +252,8 @@ impl Round<'_> {
             let away = reflect(w, at.n);
             self.follow(Ray::new(at.leave(away), away), flux * mirrored, draws.fork(0), found);
             let passed = transmittance(plan.body.eta, w.dot(at.n));
-            if let Some((ray, flux)) = self.walk(plan, &at, w, flux * passed, &mut draws, found) {
+            let arrived = Arrived { plan, at, w, flux: flux * passed };
+            if let Some((ray, flux)) = self.walk(&arrived, &mut draws, found) {
                 self.follow(ray, flux, draws, found);
             }
         });
@@ -402,19 +403,13 @@ impl Round<'_> {
             (true, true) => (draws.number() < 0.5, flux * 2.0),
             (step, _) => (step, flux),
         };
-        if step { self.step(plan, &at, w, flux, draws, found) } else { self.walk(plan, &at, w, flux, draws, found) }
+        let rest = Arrived { flux, ..*arrived };
+        if step { self.step(&rest, draws, found) } else { self.walk(&rest, draws, found) }
     }
 
     /// The near part of what entered, let out close to where that was.
-    fn step(
-        &self,
-        plan: &Plan,
-        at: &SurfacePoint,
-        w: Vec3,
-        flux: Rgb,
-        draws: &mut PathSampler,
-        found: &mut Found,
-    ) -> Option<(Ray, Rgb)> {
+    fn step(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
+        let &Arrived { plan, at, w, flux } = arrived;
         let near = plan.near.as_ref()?;
         let key = hash_combine(
             self.turn.seed,
@@ -440,15 +435,8 @@ impl Round<'_> {
     }
 
     /// What the model of the body lacks: light scattered less often, until it leaves.
-    fn walk(
-        &self,
-        plan: &Plan,
-        at: &SurfacePoint,
-        w: Vec3,
-        flux: Rgb,
-        draws: &mut PathSampler,
-        found: &mut Found,
-    ) -> Option<(Ray, Rgb)> {
+    fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
+        let &Arrived { plan, at, w, flux } = arrived;
         let inside = refract(w, at.n, plan.body.eta)?;
         let from = (at.leave(inside), inside);
         self.of.paths.unmodelled(self.view, plan.body.object(), from, flux, draws, &mut found.tally)

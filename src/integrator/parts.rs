@@ -30,6 +30,16 @@ impl Part {
         }
     }
 
+    /// That `method`, one of surfaces alone, has no cache, and what it shows of bodies.
+    pub(super) fn no_cache(scene: &Scene, method: &str) -> Self {
+        let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
+        let why = match translucent {
+            true => format!("`{method}` shows translucent surfaces as Lambertian ones of the same reflectance"),
+            false => "no translucent material".into(),
+        };
+        Self::left_out("area tables and sample cache", why)
+    }
+
     /// A part that is left out.
     pub fn left_out(name: impl Into<String>, why: impl Into<String>) -> Self {
         Self { name: name.into(), built: false, why: why.into() }

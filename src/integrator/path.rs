@@ -54,7 +54,7 @@ impl Integrator for Path {
             *out = match hit {
                 _ if inside => self.paths.seen_from_inside(view, ray, &mut scratch, tally),
                 None => self.light.lights.environment(ray.ray.direction),
-                Some(hit) => self.paths.seen(view, ray, hit, &mut scratch, tally),
+                Some(hit) => self.paths.shade(view, &[], ray, &mut scratch, tally, hit),
             };
         }
     }
@@ -71,13 +71,7 @@ impl Integrator for Path {
         };
         parts.push(Part::built("paths", over));
         parts.extend(clear_bodies(scene));
-        let translucent = scene.objects.iter().any(|o| scene.materials[o.material].surface.is_translucent());
-        let why = if translucent {
-            "`path` shows translucent surfaces as Lambertian ones of the same reflectance"
-        } else {
-            "no translucent material"
-        };
-        parts.push(Part::left_out("area tables and sample cache", why));
+        parts.push(Part::no_cache(scene, "path"));
         parts
     }
 }

@@ -141,7 +141,7 @@ impl Subsurface {
                     let straight = self.light.reflected(view, &at, albedo, &mut ray.stream.clone(), tally);
                     straight + indirect.paths.reflected(view, ray, hit, &mut paths, tally)
                 }
-                Some(hit) => indirect.paths.seen(view, ray, hit, &mut paths, tally),
+                Some(hit) => indirect.paths.shade(view, &[], ray, &mut paths, tally, hit),
             };
             asked.extend(paths.asked.drain(..).map(|asked| (i, asked)));
         }

@@ -177,7 +177,8 @@ impl VolumePath {
         clear::warning(scene, &self.light.lights, passes).into_iter().collect()
     }
 
-    fn shade(
+    /// What the camera sees at `hit`, but for what is asked of models, which is added to `scratch`.
+    pub(super) fn shade(
         &self,
         view: View<'_>,
         pass: &[Option<Cells>],

@@ -88,18 +88,6 @@ impl VolumePath {
         Self { stand_ins, bounces, bodies, camera_in, ..Self::surfaces(scene, options) }
     }
 
-    /// Radiance along the ray of the camera but for what is asked of models, which is added to `scratch`.
-    pub(in super::super) fn seen(
-        &self,
-        view: View<'_>,
-        ray: &CameraRay,
-        hit: &Hit,
-        scratch: &mut Scratch,
-        tally: &mut Tally,
-    ) -> Rgb {
-        self.shade(view, &[], ray, scratch, tally, hit)
-    }
-
     /// Radiance that the opaque surface at `hit` reflects towards the camera, but for light straight from lights, and for what is asked of
     /// models, which is added to `scratch`.
     pub(in super::super) fn reflected(
