@@ -291,6 +291,8 @@ fn what_is_no_body_is_refused_by_name() {
     assert!(taken.contains("another name"), "{taken}");
     let priority = refusal(&|text| format!("{text}\npriority = 3"));
     assert!(priority.contains("part 0") && priority.contains("is 3"), "{priority}");
+    let sheet = refusal(&|text| format!("{text}\nthickness = 0.1"));
+    assert!(sheet.contains("\"part 1\"") && sheet.contains("a sheet is a body by itself"), "{sheet}");
     let empty = refusal(&|text| text.replace("body = \"hand\"", "body = \"\""));
     assert!(empty.contains("a name in quotes"), "{empty}");
 }
