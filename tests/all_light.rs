@@ -85,6 +85,34 @@ fn white_bodies_over_a_white_floor_are_white() {
     }
 }
 
+/// At the bottom of a well with white walls nearly all light has come over them; under another body, over that. A white furnace still, and
+/// what is wrong with such light is not hidden by light straight from the sky.
+#[test]
+fn a_white_body_in_a_white_well_is_white() {
+    let wall = |name: &str, centre: [f64; 3], u: [f64; 3], v: [f64; 3]| rectangle(name, centre, u, v, "wall");
+    let (wide, high) = (1.1, 2.5);
+    let up = [0.0, high, 0.0];
+    let well = wall("floor", [0.0; 3], [wide, 0.0, 0.0], [0.0, 0.0, -wide])
+        + &wall("left", [-wide, high, 0.0], up, [0.0, 0.0, wide])
+        + &wall("right", [wide, high, 0.0], up, [0.0, 0.0, -wide])
+        + &wall("back", [0.0, high, -wide], [wide, 0.0, 0.0], up)
+        + &wall("front", [0.0, high, wide], [-wide, 0.0, 0.0], up)
+        + &diffuse("wall", 1.0)
+        + &sky(1.0);
+    let milk = translucent("milk", "sigma_s = [5, 10, 20]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3");
+    let ball = |name: &str, y: f64| sphere(name, [0.0, y, 0.0], 1.0, 16, "milk");
+    let text = camera([0.9, 2.06, 0.9], [0.0, 1.3, 0.0], 40.0, [8, 8]) + &well + &milk + &ball("low", 1.02);
+    for (text, most, noise) in [(text.clone(), 0.1, 0.007), (text + &ball("high", 3.1), 0.01, 0.011)] {
+        let scene = load(&text);
+        let with = |seed| options(Estimator::Cut, 32768, seed);
+        let straight = means(&scene, 2, 4, |seed| subsurface(&scene, SubsurfaceOptions { bounces: 0, ..with(seed) }));
+        assert!(straight[0].0 < most, "{straight:?}");
+        for c in means(&scene, 16, 10, |seed| subsurface(&scene, with(seed))) {
+            agree(c, (1.0, 0.0), Within { errors: 5.0, noise }, "in a well");
+        }
+    }
+}
+
 /// However the light of a pass is summed: by the cache alone, exit by exit, or with a near field, whose light over other surfaces comes
 /// by steps of the paths.
 #[test]
