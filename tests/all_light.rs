@@ -150,6 +150,24 @@ fn light_passes_straight_through_clear_bodies() {
     }
 }
 
+/// On a black body of a high index there is nothing but what it mirrors, floor and sky, which no model errs on.
+#[test]
+fn black_bodies_mirror_what_is_around_them() {
+    let text = camera([0.0, 2.0, 12.0], [0.0; 3], 8.0, [12, 12])
+        + &sphere("ball", [0.0; 3], 1.0, 24, "tar")
+        + &rectangle("floor", [0.0, -1.02, 0.0], [4.0, 0.0, 0.0], [0.0, 0.0, -4.0], "floor")
+        + &translucent("tar", "sigma_s = [0.01, 0.01, 0.01]\nsigma_a = [1000, 1000, 1000]\ng = 0\neta = 3")
+        + &diffuse("floor", [0.8, 0.5, 0.2])
+        + &sky(1.0);
+    let scene = load(&text);
+    let models = means(&scene, 32, 10, |seed| subsurface(&scene, options(Estimator::Cut, 1024, seed)));
+    let paths = VolumePathOptions { photons: 0, ..VolumePathOptions::default() };
+    let truth = means(&scene, 64, 10, |seed| VolumePath::new(&scene, VolumePathOptions { seed, ..paths }).unwrap());
+    for c in 0..3 {
+        agree(models[c], truth[c], WITHIN, "mirrored");
+    }
+}
+
 /// A convex body alone costs what it cost: the same picture, bit for bit, and `check` says why.
 #[test]
 fn what_nothing_reflects_to_is_left_out() {
