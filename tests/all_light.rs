@@ -85,7 +85,7 @@ fn white_bodies_over_a_white_floor_are_white() {
     }
 }
 
-/// At the bottom of a well with white walls nearly all light has come over them; under another body, over that. A white furnace still, and
+/// At the bottom of a well with white walls nearly all light has come over them; under another body, over or through that. A white furnace still, and
 /// what is wrong with such light is not hidden by light straight from the sky.
 #[test]
 fn a_white_body_in_a_white_well_is_white() {
@@ -102,7 +102,11 @@ fn a_white_body_in_a_white_well_is_white() {
     let milk = translucent("milk", "sigma_s = [5, 10, 20]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3");
     let ball = |name: &str, y: f64| sphere(name, [0.0, y, 0.0], 1.0, 16, "milk");
     let text = camera([0.9, 2.06, 0.9], [0.0, 1.3, 0.0], 40.0, [8, 8]) + &well + &milk + &ball("low", 1.02);
-    for (text, most, noise) in [(text.clone(), 0.1, 0.007), (text + &ball("high", 3.1), 0.01, 0.011)] {
+    let water = translucent("water", "sigma_s = [1e-9, 1e-9, 1e-9]\nsigma_a = [1e-6, 1e-6, 1e-6]\ng = 0\neta = 1.3");
+    let clear = ball("high", 3.1).replace("milk", "water") + &water;
+    for (text, most, noise) in
+        [(text.clone(), 0.1, 0.007), (text.clone() + &clear, 0.01, 0.014), (text + &ball("high", 3.1), 0.01, 0.011)]
+    {
         let scene = load(&text);
         let with = |seed| options(Estimator::Cut, 32768, seed);
         let straight = means(&scene, 2, 4, |seed| subsurface(&scene, SubsurfaceOptions { bounces: 0, ..with(seed) }));
