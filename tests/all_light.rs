@@ -233,7 +233,7 @@ fn light_between_petals_ends_with_every_model() {
             model.name(),
             method.near_fields()
         );
-        assert!((0.1..3.0).contains(&found), "{}: {found}", model.name());
+        assert!((0.1..0.4).contains(&found), "{}: {found}", model.name());
     }
 }
 

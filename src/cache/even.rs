@@ -35,7 +35,8 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
     let surface = view.scene.surface(body.object()).inside.as_ref()?;
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
-    let (own, sheet) = (body.model.total_of_all_faces(), body.model.name() == ModelName::SLAB);
+    let own = body.model.total_of_all_faces();
+    let sheet = own != body.model.total();
     // What begins with light scattered twice competes with light scattered once too: the standard dipole has about the total of both.
     let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
