@@ -164,8 +164,9 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
         };
         let entry = Entry { x: Vec3::ZERO, n: Vec3::Z, w: Vec3::NEG_Z };
         let flux = rings.flux(|exit| f64::from(model.eval(&entry, exit)[0]), exitance);
-        let first = model.claims().first_order;
-        let (mut wrong, mut total, mut variance) = (straight, -straight, 0.0);
+        let (first, held) = (model.claims().first_order, model.claims().unscattered);
+        // What comes through straight stands beside models that leave it out, and those of half spaces have it somewhere.
+        let (mut wrong, mut total, mut variance) = if held { (straight, -straight, 0.0) } else { (0.0, 0.0, 0.0) };
         for (flux, truth) in flux.iter().flatten().zip(truth.iter().flatten()) {
             let [_, one, more] = truth.map(|s| s.mean(paths));
             // Exact single scattering stands beside models that leave it out.
@@ -176,8 +177,10 @@ fn report(head: &str, shape: Shape, medium: &Medium, truth: &Truth, paths: f64) 
         }
         row += &format!(",{:.3},{:.3}", total / all, wrong / all);
         largest = largest.max(variance.sqrt() / all);
-        let far_model: f64 =
-            places().map(|(face, i)| flux[face][i] + if first { 0.0 } else { truth[face][i][1].mean(paths).0 }).sum();
+        let beside = |order: usize, held: bool, (face, i): (usize, usize)| {
+            if held { 0.0 } else { truth[face][i][order].mean(paths).0 }
+        };
+        let far_model: f64 = places().map(|at| flux[at.0][at.1] + beside(0, held, at) + beside(1, first, at)).sum();
         far_row += &if far_known { format!(",{:.3}", far_model / far_flux - 1.0) } else { ",".into() };
     }
     println!("{head},{largest:.3}{row}{far_row}");

@@ -117,11 +117,16 @@ fn slab() {
                 continue;
             };
             let r = row.number("r") as f32;
-            reflected.add(row, model.exitance(r)[0], row.number("Rd"));
-            transmitted.add(row, model.transmitted(r)[0], row.number("Td"));
-            for (got, column) in
-                [(marmor::bssrdf::Bssrdf::total(&model)[0], "Rd_total"), (model.total_transmitted()[0], "Td_total")]
-            {
+            // The tables are of the published formula, whose light is not all scattered in the slab.
+            let [r_share, t_share] = model.scattered().map(|share| share[0]);
+            reflected.add(row, model.exitance(r)[0] / r_share, row.number("Rd"));
+            let (total_r, total_t) = (marmor::bssrdf::Bssrdf::total(&model)[0], model.total_transmitted()[0]);
+            if t_share == 0.0 {
+                assert!(total_t == 0.0 && model.transmitted(r)[0] == 0.0);
+                continue;
+            }
+            transmitted.add(row, model.transmitted(r)[0] / t_share, row.number("Td"));
+            for (got, column) in [(total_r / r_share, "Rd_total"), (total_t / t_share, "Td_total")] {
                 let exact = row.number(column);
                 if exact.abs() > 1e-37 {
                     let error = (f64::from(got) / exact - 1.0).abs();

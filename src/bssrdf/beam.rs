@@ -379,7 +379,7 @@ impl Bssrdf for PhotonBeamDiffusion {
     }
 
     fn claims(&self) -> Claims {
-        Claims { first_order: false, reciprocal: false, bounded_energy: false }
+        Claims { unscattered: true, first_order: false, reciprocal: false, bounded_energy: false }
     }
 
     fn name(&self) -> ModelName {

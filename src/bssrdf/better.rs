@@ -118,7 +118,7 @@ impl Channel for BetterChannel {
 impl DistanceOnly for BetterDipole {
     type Channel = BetterChannel;
     const NAME: ModelName = ModelName::BETTER;
-    const CLAIMS: Claims = Claims { first_order: false, reciprocal: true, bounded_energy: true };
+    const CLAIMS: Claims = Claims { unscattered: true, first_order: false, reciprocal: true, bounded_energy: true };
 
     fn channels(&self) -> &Channels<BetterChannel> {
         &self.channels

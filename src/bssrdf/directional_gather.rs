@@ -112,7 +112,7 @@ impl Bssrdf for DirectionalDipole {
     }
 
     fn claims(&self) -> Claims {
-        Claims { first_order: true, reciprocal: false, bounded_energy: false }
+        Claims { unscattered: true, first_order: true, reciprocal: false, bounded_energy: false }
     }
 
     /// Total over a plane at normal incidence; above 1 for weak absorption unless calibrated.

@@ -192,9 +192,12 @@ pub trait Bssrdf: Send + Sync {
     }
 }
 
-/// What a model promises.
+/// What a model promises. Which orders of scattering S_d has: two and more always.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Claims {
+    /// All light that enters counts as scattered, as it is in the half space that the model is of: the total has what a thin body lets
+    /// through unscattered too. Where that comes through straight, beside the model, both together are held to what has entered.
+    pub unscattered: bool,
     /// Light scattered once is in S_d; adding single scattering would count it twice.
     pub first_order: bool,
     /// Exchanging entry and exit changes nothing.

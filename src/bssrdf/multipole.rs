@@ -12,6 +12,8 @@ pub(super) struct Multipole {
     image: f64,
 }
 
+/// The share of T of the point source that T of an exponential one may be.
+const MOST_TRANSMITTED: f64 = 2.0;
 /// Images of each kind summed one by one on each side; the rest is an integral.
 const PAIRS: i32 = 48;
 /// The Fourier series stands in for the images beyond this part of a period.
@@ -49,7 +51,29 @@ impl Multipole {
 
     /// Total transmittance over α′.
     pub(super) fn total_transmitted(&self) -> f64 {
-        0.5 * (self.plane(self.thickness - 1.0) - self.plane(self.thickness + self.image))
+        self.transmitted_from(1.0)
+    }
+
+    /// Total transmittance over α′ of a source at another depth `z` than 1.
+    pub(super) fn transmitted_from(&self, z: f64) -> f64 {
+        0.5 * (self.plane(self.thickness - z) - self.plane(self.thickness + self.image + z - 1.0))
+    }
+
+    /// What is left of R and of T of light that is scattered at all: the exponential source ends at the far face, where the point
+    /// source at depth 1 stands for one without end. `unscattered` is the share that comes through, exp(-σ_t H).
+    ///
+    /// Without absorption R and T of a source are linear in its depth. Beyond the slab lies the share exp(-H), at H + 1 in the mean, which R
+    /// and T of the point source have; what of it is scattered all the same, forwards, leaves by the far face. With absorption R keeps that
+    /// ratio, and T is that of a source at the mean depth of the rest; both together never more than R + T, whose source has all light.
+    pub(super) fn scattered(&self, z_bb: f64, unscattered: f64) -> [f64; 2] {
+        let (h, beyond) = (self.thickness, (-self.thickness).exp());
+        let depth = (1.0 - (1.0 + h) * beyond) / (1.0 - beyond);
+        let through = (1.0 - beyond) * self.transmitted_from(depth) + beyond - unscattered;
+        let reflected = 1.0 - beyond * (z_bb - 1.0) / (h + z_bb - 1.0);
+        let all = self.total_transmitted();
+        // Far out of what diffusion knows, in thick slabs that absorb nearly all, T and its correction are nothing both.
+        let most = (1.0 + (1.0 - reflected) * self.total_reflected() / all).min(MOST_TRANSMITTED);
+        [reflected, if all > 0.0 && most > 0.0 { (through / all).clamp(0.0, most) } else { 1.0 }]
     }
 
     /// h(z) = Σ_i sign(z + iP) exp(-s |z + iP|) for 0 < z < P.

@@ -230,7 +230,7 @@ impl Width {
 impl DistanceOnly for NormalisedDiffusion {
     type Channel = Width;
     const NAME: ModelName = ModelName::NORMALISED;
-    const CLAIMS: Claims = Claims { first_order: true, reciprocal: true, bounded_energy: true };
+    const CLAIMS: Claims = Claims { unscattered: true, first_order: true, reciprocal: true, bounded_energy: true };
 
     fn channels(&self) -> &Channels<Width> {
         &self.channels

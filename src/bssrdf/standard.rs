@@ -107,7 +107,7 @@ impl Channel for Pole {
 impl DistanceOnly for StandardDipole {
     type Channel = Pole;
     const NAME: ModelName = ModelName::STANDARD;
-    const CLAIMS: Claims = Claims { first_order: true, reciprocal: true, bounded_energy: true };
+    const CLAIMS: Claims = Claims { unscattered: true, first_order: true, reciprocal: true, bounded_energy: true };
 
     fn channels(&self) -> &Channels<Pole> {
         &self.channels

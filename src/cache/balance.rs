@@ -5,6 +5,9 @@
 //! without end. Light in the body has two ends: it leaves, on a plane the share P of it, or is absorbed. With s times the surface within reach it
 //! leaves s times as fast, and is absorbed as fast as before: s P / (s P + 1 - P) leave. So what is gathered is divided by s P + 1 - P. No
 //! more leaves than has entered, and a white furnace of a body that absorbs nothing is white at every point of any shape.
+//!
+//! A thin body lets a share q through unscattered, which no model of a half space knows of, and paths bring it beside the model. Of what
+//! leaves by the model 1 - q is the most, so that both together are no more than has entered either.
 
 use crate::math::{DVec3, Rgb, Vec3};
 use std::collections::HashMap;
@@ -27,7 +30,8 @@ pub struct Known {
     pub x: Vec3,
     /// Normal there.
     pub n: Vec3,
-    /// What sums here are divided by: s P + 1 - P, s being what even light brings over what it brings on a plane.
+    /// What sums here are divided by: s P + 1 - P, s being what even light brings over what it brings on a plane, or more where that
+    /// would leave too much beside unscattered light.
     pub divisor: Rgb,
 }
 

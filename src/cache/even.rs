@@ -1,6 +1,7 @@
 //! Even light from all sides on a body, for its [`Balance`].
 
 use super::balance::Known;
+use super::straight::straight;
 use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, Scratch, Tuning};
 use crate::bssrdf::{Exit, ModelName, ModelOptions, Partition};
 use crate::geometry::SurfacePoint;
@@ -24,11 +25,14 @@ const CHUNK: usize = 1024;
 /// Points at the most where the near part is gathered, and samples of it.
 const NEAR: [u32; 2] = [1 << 11, 1 << 18];
 
+/// The least share of light that is taken to be scattered in a body.
+const LEAST_SCATTERED: f32 = 1e-6;
+
 /// What numbers of the directions of even light are for.
 const EVEN_LIGHT: u64 = 0x6576_656e;
 
-/// The balance of the body of `plan`; a function of scene and seed.
-pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
+/// The balance of the body of `plan`, through which light may come `clear`: unscattered, beside the model. A function of scene and seed.
+pub fn balance(plan: &Plan, view: View<'_>, clear: bool, seed: u64) -> Option<Balance> {
     let body = &plan.body;
     let samples = plan.samples.clamp(SAMPLES[0], SAMPLES[1]);
     let count = (samples / SAMPLES_PER_POINT).min(if plan.near.is_some() { NEAR[0] } else { u32::MAX });
@@ -70,23 +74,38 @@ pub fn balance(plan: &Plan, view: View<'_>, seed: u64) -> Option<Balance> {
                 Some(GatherPoint { exit, place: at.x, stream: PixelStream::new(seed, (chunk * CHUNK + i) as u64, 0) })
             };
             let points: Vec<GatherPoint> = picks.iter().enumerate().filter_map(point).collect();
+            // The total of a half space has all light that is scattered in it, where a thin body lets some through.
+            let beside = clear && body.model.claims().unscattered;
+            let straight = |numbers: &(f64, [f32; 7])| {
+                let at = flat(*numbers)?;
+                let [.., u, v] = numbers.1;
+                Some(if beside { straight(plan, view, &at, [u, v]) } else { Rgb::BLACK })
+            };
+            let straight: Vec<Rgb> = picks.iter().filter_map(straight).collect();
             let mut sums = Vec::new();
             let (mut scratch, mut tally) = (Scratch::default(), Tally::default());
             plan.unbalanced_sum((&gatherer, Detail::Fine), &points, &mut scratch, &mut tally, &mut sums);
             for (point, sum) in points.iter().zip(&mut sums) {
                 *sum += near_part(plan, view, point, NEAR[1] / count, &mut tally);
             }
-            let divisor = |sum: &Rgb| {
+            let divisor = |sum: &Rgb, straight: &Rgb| {
                 let divisor = |c: usize| {
                     // Some models send out more than has entered.
                     let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]).min(1.0));
                     // What would leave by the other face of a sheet is lost where that is not there.
-                    (s * p + 1.0 - p).max(if sheet { 1.0 } else { 0.0 }) as f32
+                    let divisor = (s * p + 1.0 - p).max(if sheet { 1.0 } else { 0.0 });
+                    // The share s p / divisor leaves, which is no more than what does not come through straight.
+                    divisor.max(s * p / f64::from((1.0 - straight[c]).max(LEAST_SCATTERED))) as f32
                 };
                 // A channel that no light comes out of is as good as any.
                 Rgb::from_fn(|c| if divisor(c).is_normal() { divisor(c) } else { 1.0 })
             };
-            points.iter().zip(&sums).map(|(p, sum)| Known { x: p.exit.x, n: p.exit.n, divisor: divisor(sum) }).collect()
+            let known = |((p, sum), straight): ((&GatherPoint, &Rgb), &Rgb)| Known {
+                x: p.exit.x,
+                n: p.exit.n,
+                divisor: divisor(sum, straight),
+            };
+            points.iter().zip(&sums).zip(&straight).map(known).collect()
         })
         .collect();
     Some(Balance::new(known.into_iter().flatten().collect(), area, body.table().centre()))

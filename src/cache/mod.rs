@@ -12,6 +12,7 @@ mod fill;
 mod near;
 mod notes;
 mod plan;
+mod straight;
 mod survey;
 mod thinned;
 mod tree;

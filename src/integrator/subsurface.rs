@@ -261,7 +261,10 @@ impl Integrator for Subsurface {
                 each.for_each(|(plan, seen)| plan.iter().for_each(|plan| plan.survey(view, lights, &seen)));
                 if self.indirect.is_some() {
                     let seed = self.options.seed;
-                    self.plans.iter().flatten().for_each(|plan| plan.balanced_by(|| balance(plan, view, seed)));
+                    for plan in self.plans.iter().flatten() {
+                        let clear = lets_light_through(&plan.body.body, plan.medium());
+                        plan.balanced_by(|| balance(plan, view, clear, seed));
+                    }
                 }
             });
         });
