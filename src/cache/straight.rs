@@ -50,7 +50,7 @@ fn through(plan: &Plan, view: View<'_>, at: &SurfacePoint, mut w: Vec3) -> Rgb {
         left = left * sigma_t.map(|s| (-s * t).exp());
         let mirrored = reflectance(1.0 / plan.body.eta, cosine);
         out += left * (1.0 - mirrored);
-        left = left * mirrored;
+        left *= mirrored;
         w = reflect(-w, -there.n_geometric);
         from = there.leave(w);
     }
