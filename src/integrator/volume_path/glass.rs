@@ -36,7 +36,7 @@ pub fn camera_in(scene: &Scene) -> Stack {
 struct Passing<'a>(&'a VolumePath);
 
 impl Guide for Passing<'_> {
-    fn watch<'a>(&'a mut self, _: &'a Interior, _: bool) -> impl WalkObserver + 'a {
+    fn watch<'a>(&'a mut self, _: &'a Interior, _: &'a Stack, _: bool) -> impl WalkObserver + 'a {
         Ends
     }
 
