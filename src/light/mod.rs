@@ -85,6 +85,12 @@ impl Reference {
         Self { x: at.x, n: Some(at.n), reach: 0.0 }
     }
 
+    /// A place in a medium that light comes to straight.
+    #[inline]
+    pub fn place(x: DVec3) -> Self {
+        Self { x, n: None, reach: 0.0 }
+    }
+
     /// A body within `bounds`, no place of it in particular.
     pub fn body(bounds: &Aabb) -> Self {
         Self::inside(bounds.centre(), bounds)
@@ -160,12 +166,32 @@ impl LightSample {
             }
             LightEnd::Direction(w) => (above(w)?, at.n.dot(w) / self.pdf as f32, self.pdf as f32),
         };
-        if factor <= 0.0 {
-            return None;
-        }
+        let shadow = self.shadow(at, w);
+        (factor > 0.0).then(|| self.arriving(w, factor, pdf_angle, shadow))
+    }
+
+    /// Its light at the place `x` in a medium, over straight lines: of the [`Arrival`] the irradiance is that across its direction. `None`
+    /// where it leaves the light at its dark side.
+    pub fn arrival_in_medium(&self, x: DVec3) -> Option<Arrival> {
+        let (w, per_pdf, shadow) = match &self.end {
+            LightEnd::Point { at: light, .. } => {
+                let to_light = (light.x - x).as_vec3();
+                let distance = to_light.length();
+                if distance <= 0.0 {
+                    return None;
+                }
+                let w = to_light / distance;
+                let per_pdf = self.cosine(w) / distance / distance / self.pdf as f32;
+                (w, per_pdf, Ray::between(x, light.arrive(w, x, 0.0)))
+            }
+            LightEnd::Direction(w) => (*w, 1.0 / self.pdf as f32, Ray::new(x, *w)),
+        };
+        (per_pdf > 0.0).then(|| self.arriving(w, per_pdf, 1.0 / per_pdf, shadow))
+    }
+
+    fn arriving(&self, w: Vec3, factor: f32, pdf_angle: f32, shadow: Ray) -> Arrival {
         let pdf_angle = if self.is_delta { f32::INFINITY } else { pdf_angle };
-        let (irradiance, shadow) = (self.radiance * factor, self.shadow(at, w));
-        Some(Arrival { w, irradiance, pdf_angle, shadow, light: Some(self.light) })
+        Arrival { w, irradiance: self.radiance * factor, pdf_angle, shadow, light: Some(self.light) }
     }
 
     /// From a surface, which light leaves against the unit vector `w`, to the light.

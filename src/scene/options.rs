@@ -96,10 +96,10 @@ impl Estimator {
     }
 }
 
-/// [`MethodOptions::photons`] unless the scene says: one for every second pixel of the picture, within bounds, so that
-/// photons and paths from the camera take about as long.
+/// [`MethodOptions::photons`] unless the scene says: one for every 16 pixels of the picture, within bounds. Found by measuring the error at
+/// equal time: more cost more than they bring (docs/volume-path.md).
 pub fn default_photons([width, height]: [u32; 2]) -> u32 {
-    (u64::from(width) * u64::from(height) / 2).clamp(1 << 14, 1 << 18) as u32
+    (u64::from(width) * u64::from(height) / 16).clamp(1 << 8, 1 << 18) as u32
 }
 
 named! {
@@ -164,4 +164,15 @@ pub struct RenderOptions {
     pub seed: Option<u64>,
     /// Exposure of the PNG \[stops\], -64 to 64.
     pub exposure: Option<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn photons_are_in_proportion_to_the_picture() {
+        let sizes = [[1, 1], [48, 48], [64, 64], [128, 128], [512, 512], [2048, 2048], [65536, 65536]];
+        assert_eq!(sizes.map(default_photons), [256, 256, 256, 1024, 16384, 1 << 18, 1 << 18]);
+    }
 }

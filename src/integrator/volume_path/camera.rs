@@ -4,20 +4,21 @@ use super::VolumePath;
 use super::cells::Cells;
 use super::connect::{Scratch, connect, walked_mis_weight};
 use super::draws::PathSampler;
-use super::interior::{Edge, Interior, MOST_SURFACES, Straight, WalkObserver, russian_roulette};
-use super::nesting::{self, Entry, Guide, Meets};
+use super::interior::{Edge, Interior, MOST_SURFACES, Straight, Turn, WalkObserver, russian_roulette};
+use super::nesting::{self, Entry, Guide, Meets, Stack};
 use super::spectrum::Spectrum;
-use super::through::{drawn_light, mis_weight_by_chance, sun_mis_weight_by_chance};
+use super::through::drawn_light;
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
-use crate::light::{Arrival, Reference, emitted};
+use crate::light::{Reference, emitted};
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::scene::{Orders, Surface};
-use crate::surface::Bsdf;
+use crate::surface::{Bsdf, Lambertian};
 use crate::tally::{Cause, Tally, WalkTally};
+use std::f32::consts::FRAC_1_PI;
 
 /// A path and what it has found.
 pub struct CameraPath<'a> {
@@ -42,8 +43,11 @@ pub struct CameraPath<'a> {
     pub other: f32,
     /// Times scattered in media.
     pub order: u32,
-    /// Density [1/sr] of the present direction, where lights were asked for at the last surface, and that place.
-    pub bsdf_pdf: Option<(f32, Reference)>,
+    /// Density [1/sr] of the present direction, where lights were asked for over straight lines at the last surface or collision, and that
+    /// place.
+    pub sight: Option<(f32, Reference)>,
+    /// The way since then, or since the body that was left, up to the present ray [unit]: through boundaries that do not refract.
+    pub flown: f32,
     /// Whether the light of lights that it meets next is in a sum already: after a step in a near field, or a surface whose direct light
     /// was asked for apart.
     pub stepped: bool,
@@ -54,7 +58,7 @@ pub struct CameraPath<'a> {
 
 impl<'a> CameraPath<'a> {
     /// Adds light of the present order.
-    fn add(&mut self, light: Rgb) {
+    pub fn add(&mut self, light: Rgb) {
         if self.method.options.orders.contains(self.order) {
             self.radiance += light;
         }
@@ -130,43 +134,6 @@ impl<'a> CameraPath<'a> {
         self.add(self.spectrum.value_outside() * lights.environment(w) * share);
     }
 
-    /// The share of a sun's light that a path meets by chance where suns, drawn with density `by_table` there, were asked
-    /// for before.
-    fn mis_weight_of_sun(&self, by_table: f32) -> f32 {
-        match (self.bsdf_pdf, &self.left) {
-            (Some((bsdf_pdf, _)), _) => bsdf_pdf / (bsdf_pdf + by_table),
-            (None, Some((body, Some(straight)))) => {
-                sun_mis_weight_by_chance((body, self.method.through(body)), straight, by_table)
-            }
-            (None, Some((body, None))) if self.leaves_specks_out(body) => {
-                let alone = self.method.through(body).is_some_and(|t| t.sun_alone(by_table));
-                if alone { 0.0 } else { 1.0 }
-            }
-            _ => 1.0,
-        }
-    }
-
-    /// Whether small lights are left out that are met by chance alone, and seldom, after light scattered once was reflected inside a
-    /// body: white specks, where the first order stands beside a model.
-    fn leaves_specks_out(&self, body: &Interior) -> bool {
-        self.order > 0 && (self.method.once || self.method.modelled[body.object as usize].is_some())
-    }
-
-    /// The share of a lamp's light that a path meets by chance where the lamp was asked for at the collision or the Lambertian
-    /// surface before.
-    fn mis_weight(&self, hit: &Hit, direction: Vec3) -> f32 {
-        if let Some((bsdf_pdf, from)) = &self.bsdf_pdf {
-            return bsdf_pdf / (bsdf_pdf + self.method.light.lights.pdf_met(self.view.scene, from, hit, direction));
-        }
-        let Some((body, straight)) = &self.left else { return 1.0 };
-        let Some(straight) = straight else {
-            let alone = || self.method.through(body).is_some_and(|t| t.alone(hit.mesh));
-            return if self.leaves_specks_out(body) && alone() { 0.0 } else { 1.0 };
-        };
-        let lit = (*body, self.method.through(body));
-        mis_weight_by_chance(self.view.scene, &self.method.light.lights, lit, straight, hit, direction)
-    }
-
     /// Goes on from a surface that the camera sees.
     pub fn resume(&mut self, hit: &Hit, direction: Vec3) {
         if let Some(ray) = self.meet(hit, direction) {
@@ -188,19 +155,29 @@ impl<'a> CameraPath<'a> {
                 self.reflect(&at, -direction, &**bsdf)
             }
             Surface { .. } => {
-                (self.left, self.stepped) = (None, false);
+                self.stepped = false;
                 if let Some(surface) = &self.method.stand_ins[hit.mesh as usize] {
+                    self.left = None;
                     return self.reflect(&at, -direction, surface);
                 }
                 if self.method.modelled[hit.mesh as usize].is_some() {
+                    self.left = None;
                     return self.meet_modelled(hit, &at, direction);
                 }
+                let asked = self.direct > 0.0;
                 self.direct = self.other;
                 let entry = self.entry(hit, direction)?;
                 if self.other <= 0.0 {
                     return None;
                 }
-                self.bsdf_pdf = None;
+                if entry.body.matched && asked {
+                    self.flown += hit.t;
+                } else {
+                    self.turn(None);
+                }
+                if entry.body.matched {
+                    return self.inside(entry, &at, direction);
+                }
                 let w = self
                     .view
                     .scene
@@ -235,33 +212,14 @@ impl<'a> CameraPath<'a> {
         self.tally.walk.losses.add(object, cause);
     }
 
-    /// Whether light arrives.
-    fn open(&mut self, arrival: &Arrival) -> bool {
-        self.tally.rays.shadow += 1;
-        let open = !self.view.rays.occluded(&arrival.shadow);
-        if let Some(light) = arrival.light {
-            self.tally.rays.lights.ask(light, open);
-        }
-        open
-    }
-
     /// Asks for lights at an opaque surface, and goes on by its own sampling.
     fn reflect(&mut self, at: &SurfacePoint, wo: Vec3, bsdf: &dyn Bsdf) -> Option<Ray> {
         self.direct = self.other;
         if self.other <= 0.0 {
             return None;
         }
-        let lights = &self.method.light.lights;
-        for group in lights.asked().filter(|_| !bsdf.is_delta()) {
-            let u = [self.draws.number(), self.draws.number(), self.draws.number()];
-            if let Some(arrival) = lights.arrival(self.view.scene, group, at, u)
-                && self.open(&arrival)
-            {
-                let share = arrival.mis_weight_beside(bsdf.pdf(at, wo, arrival.w));
-                let light = bsdf.eval(at, wo, arrival.w) * arrival.irradiance * (share * self.other);
-                self.add(self.spectrum.value_outside() * light);
-            }
-        }
+        let weight = self.spectrum.value_outside();
+        self.ask_on((at, wo, bsdf), &Stack::default(), weight, |path| &mut path.draws);
         let (before, mut after) = (self.spectrum.value_outside().max(), self.spectrum);
         after.scale(bsdf.albedo());
         let left = after.value_outside().max();
@@ -271,7 +229,7 @@ impl<'a> CameraPath<'a> {
         let [u, v] = self.draws.pair();
         let next = bsdf.sample(at, wo, [u, v, 0.0])?;
         self.spectrum.scale(next.weight);
-        self.bsdf_pdf = (!bsdf.is_delta()).then(|| (next.pdf, Reference::surface(at)));
+        self.turn((!bsdf.is_delta()).then(|| (next.pdf, Reference::surface(at))));
         (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
@@ -292,15 +250,18 @@ impl<'a> CameraPath<'a> {
             let mut guide = Nested(self);
             nesting::walk(view, bodies, ((stack, through), from, w), &mut spectrum, &mut draws, &mut guide, &mut walks)
         } else {
-            let mut watch = Gather { path: self, body, lit: true };
+            let around = if body.matched { Stack::only(body.object) } else { Stack::default() };
+            let mut watch = Gather { path: self, body, around: &around, lit: true };
             let exit = body.walk(view, (from, w), &mut spectrum, &mut draws, &mut watch, &mut walks);
             exit.map(|exit| (body, exit))
         };
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let (body, exit) = left?;
-        self.bsdf_pdf = None;
-        self.left = Some((body, exit.straight));
+        if !body.matched {
+            self.turn(None);
+            self.left = Some((body, exit.straight));
+        }
         Some(Ray::new(exit.at.leave(exit.w), exit.w))
     }
 }
@@ -309,7 +270,9 @@ impl<'a> CameraPath<'a> {
 struct Gather<'a, 'b> {
     path: &'a mut CameraPath<'b>,
     body: &'a Interior,
-    /// Whether lamps are asked for.
+    /// What is around the path.
+    around: &'a Stack,
+    /// Whether lamps are asked for through facets.
     lit: bool,
 }
 
@@ -317,8 +280,8 @@ struct Gather<'a, 'b> {
 struct Nested<'a, 'b>(&'a mut CameraPath<'b>);
 
 impl Guide for Nested<'_, '_> {
-    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl WalkObserver + 'a {
-        Gather { path: self.0, body, lit }
+    fn watch<'a>(&'a mut self, body: &'a Interior, around: &'a Stack, lit: bool) -> impl WalkObserver + 'a {
+        Gather { path: self.0, body, around, lit }
     }
 
     fn meets(&self, object: u32) -> Meets {
@@ -358,12 +321,16 @@ impl WalkObserver for Gather<'_, '_> {
             return path.other > 0.0;
         }
         let orders = path.method.options.orders;
+        if body.matched && orders.contains(path.order) {
+            let asked = path.asked_in(body, self.around, (x, w));
+            path.radiance += asked * spectrum.value(&body.medium) * path.other;
+        }
         if let Some(through) = path.method.through(body).filter(|_| self.lit && orders.contains(path.order)) {
             let (coins, found, tally) = (&mut path.coins, &mut path.scratch.crossings, &mut *path.tally);
-            let lights = &path.method.light.lights;
+            let (lines, lights) = (path.method.lines(path.view), &path.method.light.lights);
             for group in lights.asked() {
                 let from = ((body, through), lights, group);
-                path.radiance += drawn_light(path.view, from, (x, w), spectrum, found, coins, tally) * path.direct;
+                path.radiance += drawn_light(lines, from, (x, w), spectrum, found, coins, tally) * path.direct;
             }
             if path.method.points_are_all(body) {
                 return false;
@@ -378,12 +345,35 @@ impl WalkObserver for Gather<'_, '_> {
         true
     }
 
-    /// Photons and points of lamps have no light from inside: it is met by chance alone, and is part of all other light.
+    /// Photons and points of lamps behind facets have no light from inside: it is part of all other light, and met by chance alone but for
+    /// straight lines.
     fn lamp(&mut self, hit: &Hit, w: Vec3, spectrum: &Spectrum) {
         let (path, body) = (&mut *self.path, self.body);
-        let light = spectrum.value(&body.medium) * emitted(path.view.scene, hit, w);
+        let share = if body.matched { path.mis_weight(hit, w) } else { 1.0 };
+        let light = spectrum.value(&body.medium) * emitted(path.view.scene, hit, w) * share;
         // Radiance falls by η² on its way out.
         path.add(light * (path.other / (body.eta * body.eta)));
+    }
+
+    fn surface(&mut self, at: &SurfacePoint, albedo: Rgb, spectrum: &Spectrum) {
+        let (path, body) = (&mut *self.path, self.body);
+        if body.matched {
+            let (bsdf, weight) = (Lambertian { albedo }, spectrum.value(&body.medium));
+            path.ask_on((at, at.n_geometric, &bsdf), self.around, weight, |path| &mut path.coins);
+        }
+    }
+
+    fn turned(&mut self, turn: Turn<'_>) {
+        let (path, asks) = (&mut *self.path, self.body.matched);
+        match turn {
+            Turn::None(length) => path.flown += length,
+            Turn::Scattered(x, pdf) => path.turn(asks.then(|| (pdf, Reference::place(x)))),
+            Turn::Reflected(at, w) => {
+                let pdf = at.n_geometric.dot(w) * FRAC_1_PI;
+                path.turn(asks.then(|| (pdf, Reference::surface(&SurfacePoint { n: at.n_geometric, ..*at }))));
+            }
+            Turn::Bent => path.turn(None),
+        }
     }
 }
 
@@ -413,7 +403,7 @@ pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
     let Some(entry) = path.entry(hit, direction) else { return };
     let body = entry.body;
     let (spectrum, draws) = (path.spectrum, path.draws.clone());
-    if path.method.options.specular {
+    if path.method.options.specular && !body.matched {
         let at = path.view.point(hit, direction);
         let n = shading_normal(body, &at, direction);
         path.spectrum.scale(Rgb::splat(reflectance(body.eta, -n.dot(direction))));
@@ -422,7 +412,8 @@ pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
         path.trace(Ray::new(at.leave(w), w));
     }
     (path.spectrum, path.draws) = (spectrum, draws);
-    (path.direct, path.other, path.order, path.bsdf_pdf) = (1.0, 1.0, 0, None);
+    (path.direct, path.other, path.order) = (1.0, 1.0, 0);
+    path.turn(None);
     if let Some(ray) = enter(path, entry, hit, direction) {
         path.trace(ray);
     }
@@ -432,6 +423,9 @@ pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
 pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, direction: Vec3) -> Option<Ray> {
     let body = entry.body;
     let at = path.view.point(hit, direction);
+    if body.matched {
+        return path.inside(entry, &at, direction);
+    }
     let n = shading_normal(body, &at, direction);
     let passed = transmittance(body.eta, -n.dot(direction));
     if passed <= 0.0 {

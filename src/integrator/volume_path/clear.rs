@@ -1,4 +1,4 @@
-//! Light that comes to a surface only through a clear body: no shadow ray passes a boundary, so paths meet it by chance.
+//! Light that comes to a surface only through a clear body that refracts: no shadow ray passes it, so paths meet it by chance.
 
 use crate::light::Lights;
 use crate::scene::{Body, Object, Scene, Surface};

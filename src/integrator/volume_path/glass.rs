@@ -1,6 +1,6 @@
 //! Clear bodies for methods that have models, or surfaces alone: paths go through them as in `volume_path`, and stop at what scatters.
 //!
-//! No shadow ray passes a boundary. So lights behind clear bodies are met by paths alone, with all of their light, and lights that
+//! No shadow ray of these methods passes a boundary. So lights behind clear bodies are met by paths alone, with all of their light, and lights that
 //! shadow rays meet are met by none of these.
 
 use super::connect::Scratch;
@@ -36,7 +36,7 @@ pub fn camera_in(scene: &Scene) -> Stack {
 struct Passing<'a>(&'a VolumePath);
 
 impl Guide for Passing<'_> {
-    fn watch<'a>(&'a mut self, _: &'a Interior, _: bool) -> impl WalkObserver + 'a {
+    fn watch<'a>(&'a mut self, _: &'a Interior, _: &'a Stack, _: bool) -> impl WalkObserver + 'a {
         Ends
     }
 

@@ -37,6 +37,8 @@ pub struct Interior {
     pub patience: u32,
     /// Whether paths keep what is around them, by `nesting.rs`: it is clear, or meets other bodies or itself.
     pub nested: bool,
+    /// Whether its index is that of air and light asked for over lines that go straight through its boundary: see `lines.rs`.
+    pub matched: bool,
     /// Absorption [1/unit] of a clear body, which has no collisions: its `medium` is void.
     pub absorbs: Option<Rgb>,
     /// Its triangles that lie in those of other bodies.
@@ -69,6 +71,25 @@ pub trait WalkObserver {
 
     /// A lamp inside the body ends the path, which came to it along `w`.
     fn lamp(&mut self, _hit: &Hit, _w: Vec3, _spectrum: &Spectrum) {}
+
+    /// The path has come to an opaque surface inside the body of this albedo, which faces it.
+    fn surface(&mut self, _at: &SurfacePoint, _albedo: Rgb, _spectrum: &Spectrum) {}
+
+    /// How the path goes on.
+    fn turned(&mut self, _turn: Turn<'_>) {}
+}
+
+/// What became of a path's direction.
+#[derive(Clone, Copy, Debug)]
+pub enum Turn<'a> {
+    /// Kept through a boundary that does not refract, or none; so far [unit] behind it.
+    None(f32),
+    /// Scattered at this place, into a direction of this density [1/sr].
+    Scattered(DVec3, f32),
+    /// Reflected by a Lambertian surface, which faces it, into this direction.
+    Reflected(&'a SurfacePoint, Vec3),
+    /// Refracted or mirrored.
+    Bent,
 }
 
 /// Where and how a path left a body.
@@ -140,6 +161,7 @@ impl Interior {
             endless: false,
             leak: Cause::Rounding,
             nested: false,
+            matched: false,
             absorbs: None,
             contacts: Contacts::new(),
             union: None,
@@ -157,6 +179,11 @@ impl Interior {
             }
             ray.t_min = hit.t;
         }
+    }
+
+    /// Extinction [1/unit].
+    pub fn extinction(&self) -> Rgb {
+        self.medium.sigma_t + self.absorbs.unwrap_or(Rgb::BLACK)
     }
 
     /// Whether nothing stands on `ray` but what lies inside the body.
@@ -247,11 +274,18 @@ impl Interior {
                         }
                     }
                     let next = self.scatter(w, draws);
-                    edge = Some(self.phase(w, next));
+                    let phase = self.phase(w, next);
+                    watch.turned(Turn::Scattered(x, phase));
+                    edge = Some(phase);
                     (from, w) = (x, next);
                 }
                 Flight::Boundary(at, t) => {
                     spectrum.fly(t);
+                    if self.matched {
+                        watch.turned(Turn::None(t));
+                        spectrum.leave(&self.medium);
+                        return Some(WalkExit { at, w, straight: None });
+                    }
                     let next = Boundary { eta: self.eta }.sample(&at, -w, [draws.number(), 0.0, 0.0])?.wi;
                     let cosines = [w.dot(at.n_geometric), next.dot(at.n_geometric)];
                     if cosines[1] > 0.0 {
@@ -264,6 +298,7 @@ impl Interior {
                 }
                 Flight::Opaque(at, t, albedo) => {
                     spectrum.fly(t);
+                    watch.surface(&at, albedo, spectrum);
                     let before = spectrum.value(&self.medium).max();
                     spectrum.scale(albedo);
                     let left = spectrum.value(&self.medium).max();
@@ -271,6 +306,7 @@ impl Interior {
                         return None;
                     }
                     w = cosine_hemisphere(at.n_geometric, draws.pair());
+                    watch.turned(Turn::Reflected(&at, w));
                     (from, edge, bounces) = (at.leave(w), None, bounces + 1);
                 }
                 Flight::Lamp(hit) => {

@@ -13,12 +13,14 @@ mod emission;
 mod facets;
 mod glass;
 mod interior;
+mod lines;
 mod modelled;
 #[cfg(test)]
 mod near_checks;
 mod nesting;
 mod pencil;
 mod photons;
+mod sight;
 mod spectrum;
 mod through;
 
@@ -41,6 +43,7 @@ pub(super) use connect::Scratch;
 pub(super) use draws::PathSampler;
 use interior::Interior;
 pub use interior::MOST_SURFACES;
+use lines::Lines;
 pub(super) use modelled::Modelled;
 use nesting::{Entry, Stack};
 pub use pencil::Left;
@@ -81,6 +84,8 @@ pub struct VolumePath {
     persistence: f32,
     /// The bodies that the camera stands in.
     camera_in: Stack,
+    /// Whether lights are asked for over lines through boundaries of matched bodies.
+    matched: bool,
     /// Whether this is [`Self::once`].
     once: bool,
     /// One for each object; for bodies whose light a model has.
@@ -125,13 +130,13 @@ impl VolumePath {
         }
         let lights = Lights::new(scene);
         let bodies: Vec<Option<Interior>> =
-            (0..scene.objects.len()).map(|i| interior(scene, i, CLEARANCE_CELLS)).collect();
+            (0..scene.objects.len()).map(|i| interior(scene, i, CLEARANCE_CELLS).map(matched)).collect();
         let multiple = matches!(options.orders, Orders::All | Orders::Multiple);
         let shines = lights.has_emitters() || lights.has_suns();
         let source = |body: &Option<Interior>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
-            let alone = body.medium.albedo.max() > 0.0 && !body.nested;
+            let alone = body.medium.albedo.max() > 0.0 && !body.nested && !body.matched;
             let world = scene.body(body.object).filter(|_| alone)?;
             Some(Source::new(world, options.photons, reach, options.seed))
         };
@@ -144,9 +149,10 @@ impl VolumePath {
         Ok(Self {
             throughs: throughs(scene, &lights, &bodies),
             light: DirectLight { lights, samples: 1 },
-            bodies,
             sources,
             persistence,
+            matched: bodies.iter().flatten().any(|body| body.matched),
+            bodies,
             camera_in: Stack::of(scene.camera_in(), scene.nests()),
             ..Self::surfaces(scene, options)
         })
@@ -163,6 +169,7 @@ impl VolumePath {
             sources: each.clone().map(|_| None).collect(),
             persistence: 1.0,
             camera_in: Stack::default(),
+            matched: false,
             once: false,
             modelled: vec![None; each.len()],
             stand_ins: vec![None; each.len()],
@@ -173,7 +180,8 @@ impl VolumePath {
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         // Behind a stand-in is nothing.
-        let passes = |object: usize| self.stand_ins[object].is_none();
+        let matched = |object: usize| self.bodies[object].as_ref().is_some_and(|body| body.matched);
+        let passes = |object: usize| self.stand_ins[object].is_none() && !matched(object);
         clear::warning(scene, &self.light.lights, passes).into_iter().collect()
     }
 
@@ -258,7 +266,8 @@ impl VolumePath {
             direct: 1.0,
             other: 1.0,
             order: 0,
-            bsdf_pdf: None,
+            sight: None,
+            flown: 0.0,
             stepped: false,
             left: None,
             radiance: Rgb::BLACK,
@@ -283,6 +292,11 @@ impl VolumePath {
             path.meet_light(&out);
         }
         path.radiance
+    }
+
+    /// Lines to lights.
+    fn lines<'a>(&'a self, view: View<'a>) -> Lines<'a> {
+        Lines { view, bodies: &self.bodies, matched: self.matched }
     }
 
     /// How lamps and suns are asked for at collisions in `body`.
@@ -328,6 +342,11 @@ fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
     Some(Interior { leak, nested: clear.is_some() || nests.meets[index], contacts, ..interior })
 }
 
+/// With lines through its boundary where that does not refract.
+fn matched(body: Interior) -> Interior {
+    Interior { matched: body.eta == 1.0, ..body }
+}
+
 /// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault: the models beside know nothing of them either.
 fn endless(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior>> {
     let lone = |interior: Interior| {
@@ -343,7 +362,7 @@ fn endless(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior
 /// How lamps and suns are asked for in each of the bodies that scatter.
 fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Interior>]) -> Vec<Option<RefractedNee>> {
     let of = |body: &Option<Interior>| {
-        let body = body.as_ref().filter(|body| body.medium.albedo.max() > 0.0)?;
+        let body = body.as_ref().filter(|body| body.medium.albedo.max() > 0.0 && !body.matched)?;
         RefractedNee::new(scene, lights, body.object, body.eta, body.phase.g as f32)
     };
     bodies.iter().map(of).collect()
@@ -409,6 +428,10 @@ impl Integrator for VolumePath {
                 ),
                 None if !self.light.lights.has_emitters() && !self.light.lights.has_suns() => {
                     let why = "no area light, no sun in a picture: paths meet all light by themselves";
+                    Part::left_out(format!("photons in `{name}`"), why)
+                }
+                None if body.as_ref().is_some_and(|b| b.matched) => {
+                    let why = "it does not refract: lights are asked for over straight lines through its boundary";
                     Part::left_out(format!("photons in `{name}`"), why)
                 }
                 None if body.as_ref().is_some_and(|b| b.nested) => {

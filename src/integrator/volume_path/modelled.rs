@@ -174,7 +174,7 @@ impl CameraPath<'_> {
             self.trace(Ray::new(at.leave(w), w));
         }
         if let Some(plan) = &model.near {
-            (self.spectrum, self.draws, self.bsdf_pdf) = (spectrum, draws.fork(2), None);
+            (self.spectrum, self.draws, self.sight) = (spectrum, draws.fork(2), None);
             self.spectrum.scale(Rgb::splat(passed));
             if let Some(ray) = self.step(plan, &at, w) {
                 self.trace(ray);
@@ -183,14 +183,14 @@ impl CameraPath<'_> {
         }
         let Some(body) = self.method.body(hit.mesh) else { return };
         if model.clear {
-            (self.spectrum, self.draws, self.bsdf_pdf) = (spectrum, draws.fork(3), None);
+            (self.spectrum, self.draws, self.sight) = (spectrum, draws.fork(3), None);
             self.spectrum.scale(Rgb::splat(passed));
             if let Some(ray) = refract(w, n, body.eta).and_then(|inside| self.straight(body, &at, inside)) {
                 self.trace(ray);
             }
         }
         if model.once {
-            (self.spectrum, self.draws, self.bsdf_pdf) = (spectrum, draws, None);
+            (self.spectrum, self.draws, self.sight) = (spectrum, draws, None);
             self.order = 0;
             if let Some(ray) = enter(self, Entry::alone(body), hit, direction).filter(|_| self.order > 0) {
                 self.trace(ray);
@@ -202,7 +202,7 @@ impl CameraPath<'_> {
     /// followed by itself while the path has weight, else by the chance of it.
     pub fn meet_modelled(&mut self, hit: &Hit, at: &SurfacePoint, direction: Vec3) -> Option<Ray> {
         let model = self.method.modelled[hit.mesh as usize].as_ref()?;
-        self.bsdf_pdf = None;
+        self.sight = None;
         let (n, w) = (at.n_geometric, -direction);
         // No light enters by the back of a face, and paths end there.
         if self.view.outwards(hit).n_geometric.dot(w) <= 0.0 {
@@ -218,7 +218,7 @@ impl CameraPath<'_> {
             self.spectrum.scale(Rgb::splat(mirrored));
             self.draws = draws.fork(1);
             self.trace(Ray::new(at.leave(away), away));
-            (self.spectrum, self.draws, self.bsdf_pdf, self.left) = (spectrum, draws.fork(2), None, None);
+            (self.spectrum, self.draws, self.sight, self.left) = (spectrum, draws.fork(2), None, None);
             self.stepped = false;
             self.branches -= 1;
             self.spectrum.scale(Rgb::splat(1.0 - mirrored));
@@ -301,7 +301,7 @@ impl CameraPath<'_> {
             return None;
         }
         self.left = None;
-        self.bsdf_pdf = None;
+        self.sight = None;
         self.stepped = true;
         Some(Ray::new(entry.leave(w), w))
     }

@@ -10,7 +10,7 @@
 
 use super::draws::PathSampler;
 use super::interior::{
-    Edge, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, WalkExit, WalkObserver, russian_roulette,
+    Edge, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, Turn, WalkExit, WalkObserver, russian_roulette,
 };
 use super::spectrum::Spectrum;
 use crate::geometry::SurfacePoint;
@@ -27,7 +27,7 @@ use crate::tally::{Cause, WalkTally};
 pub struct Stack(Vec<(u32, u32)>);
 
 /// An object, and +1 where light goes in, -1 where it comes out.
-type Turn = (u32, i32);
+type Crossed = (u32, i32);
 
 impl Stack {
     /// Of bodies in any order.
@@ -35,6 +35,11 @@ impl Stack {
         let mut list = around.to_vec();
         list.sort_by_key(|(object, _)| nests.rank[*object as usize]);
         Self(list)
+    }
+
+    /// One body alone, once.
+    pub fn only(object: u32) -> Self {
+        Self(vec![(object, 1)])
     }
 
     /// The body that is there; `None` in air.
@@ -52,7 +57,7 @@ impl Stack {
     }
 
     /// After these crossings; `None` where a body is left that is not around.
-    fn crossed(&self, turns: &[Turn], nests: &Nests) -> Option<Self> {
+    pub fn crossed(&self, turns: &[Crossed], nests: &Nests) -> Option<Self> {
         let mut list = self.0.clone();
         for (k, &(object, _)) in turns.iter().enumerate() {
             if turns[..k].iter().any(|(other, _)| *other == object) {
@@ -80,15 +85,15 @@ impl Stack {
 }
 
 /// Where light may go through surfaces, of one or more bodies at once.
-struct Faces {
-    turns: Vec<Turn>,
+pub struct Faces {
+    pub turns: Vec<Crossed>,
     /// Rays start this far away at least [unit]; 0 where one face is crossed alone.
-    margin: f64,
+    pub margin: f64,
 }
 
 /// The surfaces that light along `w`, with `stack` around it, meets at `hit`: its own first, then those that lie in it. At the rim of
 /// those rounding decides; there only a body that is around can be left.
-fn faces(view: View<'_>, stack: &Stack, body: &Interior, hit: &Hit, at: &SurfacePoint, w: Vec3) -> Faces {
+pub fn faces(view: View<'_>, stack: &Stack, body: &Interior, hit: &Hit, at: &SurfacePoint, w: Vec3) -> Faces {
     let turn = |n: Vec3| if n.dot(w) < 0.0 { 1 } else { -1 };
     let mut turns = vec![(hit.mesh, turn(at.n_geometric))];
     let Some(partners) = body.contacts.get(&hit.triangle) else { return Faces { turns, margin: 0.0 } };
@@ -162,8 +167,8 @@ impl<'a> Entry<'a> {
 /// Who watches a path through bodies: makes a [`WalkObserver`] for the body that the path is in; `lit` says whether lamps may be asked for
 /// at collisions there.
 pub trait Guide {
-    /// For `body`.
-    fn watch<'a>(&'a mut self, body: &'a Interior, lit: bool) -> impl WalkObserver + 'a;
+    /// For `body`, and what is `around` the path.
+    fn watch<'a>(&'a mut self, body: &'a Interior, around: &'a Stack, lit: bool) -> impl WalkObserver + 'a;
 
     /// How paths meet the body of object number `object`.
     fn meets(&self, object: u32) -> Meets;
@@ -232,14 +237,16 @@ pub fn walk<'a>(
                 spectrum.collide(distance);
                 let edge = phase.map(|phase| Edge { length: distance, phase });
                 let lit = stack.is_only(body.object);
-                if !guide.watch(body, lit).collision(x, w, edge, spectrum, draws) {
+                if !guide.watch(body, &stack, lit).collision(x, w, edge, spectrum, draws) {
                     return None;
                 }
                 if collisions % body.patience == 0 && !goes_on(body, whole, spectrum, draws) {
                     return None;
                 }
                 let next = body.scatter(w, draws);
-                phase = Some(body.phase(w, next));
+                let into = body.phase(w, next);
+                guide.watch(body, &stack, lit).turned(Turn::Scattered(x, into));
+                phase = Some(into);
                 (from, w, last) = (x, next, None);
                 continue;
             }
@@ -267,23 +274,26 @@ pub fn walk<'a>(
         if last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle)) {
             // No line meets a plane twice: the start of the ray was rounded to its wrong side, as at needles.
             from = SurfacePoint { error: 2.0 * at.error, ..at }.leave(w);
+            guide.watch(body, &stack, false).turned(Turn::None(hit.t));
             ahead = Some((distance - hit.t).max(0.0));
             continue;
         }
         let surface = view.scene.surface(hit.mesh);
         let met = match if surface.is_body() { guide.meets(hit.mesh) } else { Meets::Matt(surface.bsdf.albedo()) } {
             Meets::Matt(_) if surface.emission.is_some() => {
-                guide.watch(body, false).lamp(&hit, w, spectrum);
+                guide.watch(body, &stack, false).lamp(&hit, w, spectrum);
                 return None;
             }
             Meets::Matt(albedo) => {
                 let (at, before) = (at.facing(-w), spectrum.value(&body.medium).max());
+                guide.watch(body, &stack, false).surface(&at, albedo, spectrum);
                 spectrum.scale(albedo);
                 let left = spectrum.value(&body.medium).max();
                 if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
                     return None;
                 }
                 w = cosine_hemisphere(at.n_geometric, draws.pair());
+                guide.watch(body, &stack, false).turned(Turn::Reflected(&at, w));
                 (from, phase) = (at.leave(w), None);
                 continue;
             }
@@ -301,14 +311,17 @@ pub fn walk<'a>(
         let at = SurfacePoint { error: at.error.max(faces.margin), ..at };
         if after.top() == stack.top() {
             // In a stronger body, or of parts of one body.
+            guide.watch(body, &stack, false).turned(Turn::None(hit.t));
             (from, stack, phase) = (at.leave(w), after, None);
             ahead = Some((distance - hit.t).max(0.0));
             continue;
         }
         let next = body_of(&after);
-        let to = Boundary { eta: ratio(&at, w, body.eta, next.map_or(1.0, |b| b.eta)) }
-            .sample(&at, -w, [draws.number(), 0.0, 0.0])?
-            .wi;
+        let matched = body.matched && next.is_none_or(|b| b.matched);
+        let eta = ratio(&at, w, body.eta, next.map_or(1.0, |b| b.eta));
+        let to = if matched { w } else { Boundary { eta }.sample(&at, -w, [draws.number(), 0.0, 0.0])?.wi };
+        let turn = if matched { Turn::None(hit.t) } else { Turn::Bent };
+        guide.watch(body, &stack, false).turned(turn);
         let cosines = [w.dot(at.n_geometric), to.dot(at.n_geometric)];
         if cosines[0] * cosines[1] <= 0.0 {
             (w, phase) = (to, None);

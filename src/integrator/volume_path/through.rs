@@ -3,8 +3,9 @@
 use super::draws::PathSampler;
 use super::facets::{Bend, Crossing, Facets, Towards};
 use super::interior::{Interior, Straight};
+use super::lines::Lines;
+use super::nesting::Stack;
 use super::spectrum::Spectrum;
-use crate::integrator::View;
 use crate::light::{Group, LightEnd, LightSample, Lights, Reference};
 use crate::math::{Aabb, DVec3, Rgb, Vec3};
 use crate::optics::transmittance;
@@ -98,7 +99,7 @@ fn density_outside(body: &Interior, bend: &Bend, phase: f32) -> f32 {
 /// them is what arrives from there [WZHB09], caustics and all. Facets far away for the light to come through are looked for by
 /// chance, with its inverse as weight. Light reflected inside on its way is not in it.
 pub fn drawn_light(
-    view: View<'_>,
+    lines: Lines<'_>,
     ((body, through), lights, group): ((&Interior, &RefractedNee), &Lights, Group),
     (x, w): (DVec3, Vec3),
     spectrum: &Spectrum,
@@ -109,8 +110,8 @@ pub fn drawn_light(
     let u = [draws.number(), draws.number(), draws.number()];
     let Some(horizon) = horizon(body, x, draws) else { return Rgb::BLACK };
     let from = Reference::inside(x, &through.bounds);
-    let Some(drawn) = lights.sample(view.scene, group, &from, u) else { return Rgb::BLACK };
-    spectrum.value(&body.medium) * arriving(view, (body, through), &drawn, (x, w), horizon, found, draws, tally)
+    let Some(drawn) = lights.sample(lines.view.scene, group, &from, u) else { return Rgb::BLACK };
+    spectrum.value(&body.medium) * arriving(lines, (body, through), &drawn, (x, w), horizon, found, draws, tally)
 }
 
 /// How far away facets are looked for; `None` where no surface is that near.
@@ -122,7 +123,7 @@ fn horizon(body: &Interior, x: DVec3, draws: &mut PathSampler) -> Option<f32> {
 /// What arrives at `x` from what was drawn, per unit weight of the path.
 #[allow(clippy::too_many_arguments)] // what both callers have
 fn arriving(
-    view: View<'_>,
+    lines: Lines<'_>,
     (body, through): (&Interior, &RefractedNee),
     drawn: &LightSample,
     (x, w): (DVec3, Vec3),
@@ -132,7 +133,7 @@ fn arriving(
     tally: &mut Tally,
 ) -> Rgb {
     let decay = body.least_extinction;
-    let mesh = &view.scene.objects[body.object as usize].mesh;
+    let mesh = &lines.view.scene.objects[body.object as usize].mesh;
     let towards = match drawn.end {
         LightEnd::Point { at, .. } => Towards::Point(at.x),
         LightEnd::Direction(w) => Towards::Direction(w),
@@ -153,8 +154,8 @@ fn arriving(
     });
     let mut light = Rgb::BLACK;
     if found.len() <= MOST_TRACED {
-        for crossing in found.iter().filter(|c| open(view, body, x, c, drawn, tally)) {
-            light += carried(crossing);
+        for crossing in found.iter() {
+            light += carried(crossing) * open(lines, body, x, crossing, drawn, tally);
         }
     } else {
         // Evenly spaced marks along the sum of what is carried.
@@ -167,8 +168,9 @@ fn arriving(
             while mark < below {
                 (mark, marks) = (mark + step, marks + 1.0);
             }
-            if marks > 0.0 && open(view, body, x, crossing, drawn, tally) {
-                light += carried * (marks * step / carried.mean());
+            if marks > 0.0 {
+                let open = open(lines, body, x, crossing, drawn, tally);
+                light += carried * (marks * step / carried.mean()) * open;
             }
         }
     }
@@ -192,42 +194,42 @@ fn line(body: &Interior, crossing: &Crossing, drawn: &LightSample, phase: f32, a
     densities.by_chance / densities.by_point * if alone { 1.0 } else { densities.mis_weight_by_point() }
 }
 
-/// Whether nothing stands between `x` and what was drawn.
+/// The share of light that arrives at `x` from what was drawn, but for the body's own extinction.
 fn open(
-    view: View<'_>,
+    lines: Lines<'_>,
     body: &Interior,
     x: DVec3,
     crossing: &Crossing,
     drawn: &LightSample,
     tally: &mut Tally,
-) -> bool {
-    let open = is_open(view, body, x, crossing, drawn, &mut tally.walk);
-    tally.rays.lights.ask(drawn.light, open);
-    open
+) -> Rgb {
+    let passed = passed(lines, body, x, crossing, drawn, &mut tally.walk);
+    tally.rays.lights.ask(drawn.light, !passed.is_black());
+    passed
 }
 
-fn is_open(
-    view: View<'_>,
+fn passed(
+    lines: Lines<'_>,
     body: &Interior,
     x: DVec3,
     crossing: &Crossing,
     drawn: &LightSample,
     tally: &mut WalkTally,
-) -> bool {
+) -> Rgb {
     // Behind a face in which another lies there is no air.
     if body.contacts.contains_key(&crossing.triangle) {
-        return false;
+        return Rgb::BLACK;
     }
+    let view = lines.view;
     let at = view.scene.objects[body.object as usize].mesh.point(crossing.triangle, crossing.u, crossing.v);
     if body.union.as_ref().is_some_and(|union| !union.bears(crossing.triangle, at.x)) {
-        return false;
+        return Rgb::BLACK;
     }
     tally.rays += 1;
     if !body.lets_through(view, Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
-        return false;
+        return Rgb::BLACK;
     }
-    tally.rays += 1;
-    !view.rays.occluded(&drawn.shadow(&at, crossing.outside))
+    lines.passed(&drawn.shadow(&at, crossing.outside), &Stack::default(), &mut tally.rays)
 }
 
 /// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
@@ -270,7 +272,7 @@ pub fn sun_mis_weight_by_chance(
 mod tests {
     use super::super::interior::Flight;
     use super::*;
-    use crate::integrator::{VolumePath, VolumePathOptions};
+    use crate::integrator::{View, VolumePath, VolumePathOptions};
     use crate::light::emitted;
     use crate::optics::refract;
     use crate::query::{self, Backend};
@@ -311,7 +313,8 @@ mod tests {
         let scene = scene(medium, lamp);
         let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
         let view = View { scene: &scene, rays: &*rays };
-        let method = VolumePath::new(&scene, OPTIONS).unwrap();
+        // It asks through facets whatever the index.
+        let method = VolumePath::once(&scene, |_| true, OPTIONS.seed);
         let (body, lights) = (method.bodies[0].as_ref().unwrap(), &method.light.lights);
         let through = method.through(body);
         let from = ((body, through.unwrap()), lights, Group::Near);
@@ -339,7 +342,8 @@ mod tests {
             chance.add(lucky[0]);
             // Far less noisy, but slower.
             if i % 12 == 0 {
-                let light = drawn_light(view, from, (x, w), &spectrum, &mut found, &mut draws, &mut tally);
+                let light =
+                    drawn_light(method.lines(view), from, (x, w), &spectrum, &mut found, &mut draws, &mut tally);
                 points.add(light[0] + lucky[1]);
             }
         }
@@ -393,7 +397,8 @@ mod tests {
                 let x = draws.direction().as_dvec3() * 0.98 - scene.centre;
                 let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
                 let w = draws.direction();
-                let light = drawn_light(view, from, (x, w), &spectrum, &mut found, &mut draws, &mut tally);
+                let light =
+                    drawn_light(method.lines(view), from, (x, w), &spectrum, &mut found, &mut draws, &mut tally);
                 most = most.max(light.max() / found.len().max(1) as f32);
             }
             println!("{medium}: {most}");
