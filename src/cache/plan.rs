@@ -11,7 +11,7 @@ use crate::light::Lights;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::Medium;
 use crate::sampling::{CacheStream, Points, Turn};
-use crate::scene::{EntrySampling, Estimator, Scene, Spread, View};
+use crate::scene::{EntrySampling, Estimator, Scene, Shape, Spread, View};
 use crate::tally::{Clock, Tally};
 use std::sync::OnceLock;
 
@@ -38,6 +38,8 @@ pub struct SubsurfaceOptions {
     pub light_samples: u32,
     /// Surfaces that light may go over on its way to a body and between bodies; 0: straight from the lights alone.
     pub bounces: u32,
+    /// What decides how much light leaves where.
+    pub shape: Shape,
     /// Seed of the render.
     pub seed: u64,
 }
@@ -56,6 +58,7 @@ impl Default for SubsurfaceOptions {
             single: true,
             light_samples: 1,
             bounces: u32::MAX,
+            shape: Shape::HalfSpace,
             seed: 0,
         }
     }

@@ -102,7 +102,10 @@ impl<'a> Advice<'a> {
             1 => format!("translucent {first:?}"),
             n => format!("{first:?} and {}", counted(n - 1, "other translucent body", "other translucent bodies")),
         };
-        match self.prepared.method {
+        match &self.prepared.method {
+            Method::Subsurface(method) if method.walks() => Some(format!(
+                "{who}: paths walked through it say how much leaves where, the model has what is finer (docs/shape.md)"
+            )),
             Method::Subsurface(_) => None,
             Method::VolumePath(_) => Some(format!("{who}: light is traced through, no model: what is wrong is noise")),
             Method::Direct(_) | Method::Path(_) => {
@@ -127,10 +130,18 @@ impl<'a> Advice<'a> {
         // Of a mesh that wants mending a warning has said how.
         if mend(t).is_none() {
             choices.extend(self.better(t).map(|(model, words)| format!("{words}: {}", share(model))));
+            choices.extend(self.walk(t));
             choices.extend(trace(t, "right, but slower"));
         }
         let choices: String = choices.into_iter().map(|choice| format!("; {choice}")).collect();
         format!("{}: {own}{choices}", t.object)
+    }
+
+    /// That the model need not be all, where paths can walk through the body.
+    fn walk(&self, t: &Trustworthiness) -> Option<String> {
+        let can = matches!(self.prepared.method, Method::Subsurface(_)) && !self.prepared.as_notes;
+        let wanted = t.verdict != Verdict::Trust && t.untraceable.is_none();
+        (can && wanted).then(|| "--shape walked: within some percent".into())
     }
 
     /// A body in some lines, for `check`.

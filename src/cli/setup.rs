@@ -4,7 +4,7 @@ use marmor::bssrdf::ModelName;
 use marmor::query::Backend;
 use marmor::render::Options;
 pub use marmor::render::{Method, Prepared};
-use marmor::scene::{Estimator, MethodName, SceneFile};
+use marmor::scene::{Estimator, MethodName, SceneFile, Shape};
 use marmor::{Error, Result};
 use std::path::Path;
 
@@ -20,12 +20,16 @@ pub struct MethodArgs {
     /// How the sum over the sample cache is estimated
     #[arg(long, value_name = "NAME")]
     estimator: Option<Estimator>,
+    /// What decides how much light leaves bodies where: half-space (the model alone) or walked (paths through the body itself)
+    /// [default: the scene's, else half-space]
+    #[arg(long, value_name = "NAME")]
+    shape: Option<Shape>,
     /// Ray backend: embree or bvh [default: embree if built in]
     #[arg(long, value_name = "NAME")]
     backend: Option<Backend>,
     /// The lecture to the letter: standard dipole, independent samples, cosine-sampled directions, plain loop with
     /// rejection control, no exit normalisation
-    #[arg(long, conflicts_with_all = ["model", "estimator"])]
+    #[arg(long, conflicts_with_all = ["model", "estimator", "shape"])]
     as_notes: bool,
     /// Seed of all random numbers [default: the scene's, else 0]
     #[arg(long, value_name = "N")]
@@ -65,6 +69,7 @@ impl MethodArgs {
         put("--method", self.method.map(|m| m.name().into()));
         put("--model", self.model.map(|m| m.name().into()));
         put("--estimator", self.estimator.map(|e| e.name().into()));
+        put("--shape", self.shape.map(|s| s.name().into()));
         put("--backend", self.backend.map(|b| b.name().into()));
         for define in &self.define {
             put("-D", Some(format!("'{define}'")));
@@ -78,7 +83,7 @@ impl MethodArgs {
         words
     }
 
-    /// These options with those of `spec` over them: names joined by `+`, each of an estimator, a model, a backend or a
+    /// These options with those of `spec` over them: names joined by `+`, each of an estimator, a model, a shape, a backend or a
     /// method, or `as_notes`, a number of cached samples a pass, or `KEY=VALUE` of the scene (`cut_error=0.1` is
     /// `method.cut_error=0.1`).
     pub fn variant(&self, spec: &str) -> Result<Self> {
@@ -88,6 +93,8 @@ impl MethodArgs {
                 args.estimator = Some(estimator);
             } else if let Ok(model) = word.parse() {
                 args.model = Some(model);
+            } else if let Ok(shape) = word.parse() {
+                args.shape = Some(shape);
             } else if let Ok(backend) = word.parse() {
                 args.backend = Some(backend);
             } else if let Ok(method) = word.parse() {
@@ -127,6 +134,8 @@ impl MethodArgs {
         let model = if self.as_notes { Some(ModelName::STANDARD) } else { self.model };
         put("method.model", model.map(|m| m.name().into()));
         put("method.estimator", self.estimator.map(|e| e.name().into()));
+        let shape = if self.as_notes { Some(Shape::HalfSpace) } else { self.shape };
+        put("method.shape", shape.map(|s| s.name().into()));
         put("render.seed", self.seed.map(|s| s.to_string()));
         keys.extend(self.define.iter().cloned());
         keys
@@ -137,6 +146,7 @@ fn unknown_word(spec: &str, word: &str) -> String {
     let names = |all: Vec<&'static str>| all;
     let mut known = names(Estimator::ALL.iter().map(|v| v.name()).collect());
     known.extend(ModelName::ALL.iter().map(|v| v.name()));
+    known.extend(Shape::ALL.iter().map(|v| v.name()));
     known.extend(Backend::ALL.iter().map(|v| v.name()));
     known.extend(MethodName::ALL.iter().map(|v| v.name()));
     known.push("as_notes");

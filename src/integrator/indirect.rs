@@ -5,17 +5,19 @@
 //! mirrored it, or out of which it came, it is followed forwards: from places on bodies where the light of all samples so far is gathered
 //! as for a pixel, and from places where light arrives. What it brings to a body is a sample as any other, gathered by the next round.
 
+use super::followed::{Arrived, Followed, Found, Rows, collect};
 use super::volume_path::{Modelled, PathSampler, VolumePath, VolumePathOptions};
+use super::walked::{Emerged, WalkedBody, visible};
 use super::{MOST_SURFACES, Part, View};
 use crate::bssrdf::Exit;
 use crate::cache::{Cache, CachedSample, Detail, GatherPoint, Plan, Scratch, SubsurfaceOptions};
-use crate::geometry::SurfacePoint;
+use crate::geometry::{Patches, SurfacePoint};
 use crate::light::Lights;
-use crate::math::{Rgb, Vec3, hash_combine, unit_f32};
-use crate::optics::{reflect, reflectance, refract, transmittance};
+use crate::math::{hash_combine, unit_f32};
+use crate::optics::{reflect, reflectance, transmittance};
 use crate::query::Ray;
 use crate::sampling::{CacheStream, PixelStream, Points, Turn, cosine_hemisphere};
-use crate::scene::Scene;
+use crate::scene::{Object, Scene, Shape};
 use crate::tally::{Cause, Tally};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -31,9 +33,8 @@ const CHUNK: usize = 1024;
 const FEWEST: f64 = 64.0;
 /// What the numbers are for.
 const PURPOSE: u64 = 0x696e_6469_7265_6374;
-
-/// Samples of each object's cache: place, and all of the flux they stand for.
-type Rows = Vec<Vec<CachedSample>>;
+/// Of a trial before the first pass.
+const TRIAL: u64 = 0x74_7269_616c;
 
 /// What a method's list of parts calls [`Indirect`].
 pub const OVER: &str = "light over other surfaces";
@@ -52,6 +53,17 @@ pub struct Indirect {
     seed: u64,
     /// For each object, of even passes and of odd ones.
     streams: Vec<[CacheStream; Turn::STREAMS]>,
+    /// Bodies that paths walk through themselves, one for each object; empty where none do.
+    pub walked: Vec<Option<WalkedBody>>,
+}
+
+/// What paths through the bodies themselves brought in a pass.
+#[derive(Default)]
+pub struct Walks {
+    /// One for each body.
+    pub patches: Vec<Option<Patches>>,
+    /// All that left them.
+    pub emerged: Vec<Emerged>,
 }
 
 /// What all tasks of a pass share.
@@ -59,15 +71,8 @@ struct Round<'a> {
     of: &'a Indirect,
     view: View<'a>,
     lights: &'a Lights,
-    plans: &'a [Option<Arc<Plan>>],
     turn: Turn,
-}
-
-/// What one task found.
-#[derive(Default)]
-struct Found {
-    rows: Vec<(u32, CachedSample)>,
-    tally: Tally,
+    followed: Followed<'a>,
 }
 
 impl Indirect {
@@ -80,12 +85,18 @@ impl Indirect {
     ) -> Self {
         let SubsurfaceOptions { specular, seed, .. } = *options;
         let bounces = options.bounces.min(MOST_SURFACES);
-        let reflects = |o: &crate::scene::Object| {
+        let reflects = |o: &Object| {
             let surface = &scene.materials[o.material].surface;
             surface.clear.is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
         };
         let surfaces = scene.objects.iter().any(reflects) && plans.iter().any(Option::is_some);
         let own = hash_combine(seed, PURPOSE);
+        let body =
+            |(object, plan): (&Object, &Option<Arc<Plan>>)| Some(WalkedBody::new(&object.mesh, plan.as_ref()?, seed));
+        let walked = match options.shape {
+            Shape::Walked => scene.objects.iter().zip(plans).map(body).collect(),
+            _ => Vec::new(),
+        };
         let streams = |object| Turn::seeds(own).map(|seed| CacheStream::new(Points::Sobol, seed, object));
         Self {
             once: modelled.iter().flatten().any(|m| m.once),
@@ -100,6 +111,7 @@ impl Indirect {
             bounces,
             count: (options.cache_samples / SAMPLES_PER_PATH).max(1),
             seed: own,
+            walked,
             streams: (0..scene.objects.len() as u64).map(streams).collect(),
         }
     }
@@ -107,6 +119,15 @@ impl Indirect {
     /// What is said of it.
     pub fn part(&self) -> Part {
         let count = self.count;
+        if !self.walked.is_empty() {
+            let patches = self.walked.iter().flatten().map(WalkedBody::most_patches).max().unwrap_or(0);
+            return Part::built(
+                OVER,
+                format!(
+                    "a pass, {count} paths of light through each body, split where the camera sees what they bring; up to {patches} patches"
+                ),
+            );
+        }
         let over = if self.surfaces.is_some() { "; as many backwards over opaque surfaces" } else { "" };
         Part::built(OVER, format!("a pass, {count} paths of light from each body and {count} that it mirrors{over}"))
     }
@@ -119,7 +140,50 @@ impl Indirect {
     /// Memory beside that of `samples` cached samples of `bodies` bodies [bytes], where half of the paths arrive.
     pub fn bytes(&self, bodies: u64, samples: u64) -> u64 {
         let paths = bodies * u64::from(self.count) * if self.surfaces.is_some() { 3 } else { 2 };
-        (samples + paths / 2) * size_of::<CachedSample>() as u64
+        let walked: u64 = self.walked.iter().flatten().map(|body| body.bytes(u64::from(self.count))).sum();
+        (samples + paths / 2) * size_of::<CachedSample>() as u64 + walked
+    }
+
+    fn round<'a>(
+        &'a self,
+        (view, lights): (View<'a>, &'a Lights),
+        plans: &'a [Option<Arc<Plan>>],
+        turn: Turn,
+        patches: &'a [Option<Patches>],
+    ) -> Round<'a> {
+        let (paths, walked, bounces) = (&self.paths, &self.walked[..], self.bounces);
+        let followed = Followed { view, plans, paths, walked, patches, bounces, seed: turn.seed };
+        Round { of: self, view, lights, turn, followed }
+    }
+
+    /// Finds what the camera sees of bodies that paths walk through, and where it comes from.
+    pub fn survey(&self, view: View<'_>, lights: &Lights, plans: &[Option<Arc<Plan>>]) {
+        if self.walked.is_empty() {
+            return;
+        }
+        let trial = |body: &Option<WalkedBody>| Some(body.as_ref()?.trial());
+        let patches: Vec<Option<Patches>> = self.walked.par_iter().map(trial).collect();
+        let turn = Turn::of(hash_combine(self.seed, TRIAL), 0);
+        let round = self.round((view, lights), plans, turn, &patches);
+        let (mut rows, mut tally) = (Rows::new(plans.len()), Tally::default());
+        for plan in plans.iter().flatten() {
+            round.backwards(plan, &mut rows, &mut tally);
+            round.mirrored(plan, &mut rows, &mut tally);
+        }
+        let visible = visible(view);
+        for (body, patches) in self.walked.iter().zip(patches) {
+            let (Some(body), Some(patches)) = (body, patches) else { continue };
+            let plan = body.plan();
+            let stream = &self.streams[plan.body.object() as usize][0];
+            let builder = plan.builder(view, lights, stream, plan.density());
+            let entering = |i: u64| {
+                let (at, w, flux) = builder.arriving(i, &mut Tally::default())?;
+                let passed = transmittance(plan.body.eta, w.dot(at.n)) / self.count as f32;
+                (!flux.is_black()).then(|| (at.x, flux * passed))
+            };
+            let entering: Vec<_> = (0..u64::from(self.count)).into_par_iter().filter_map(entering).collect();
+            body.learn(view, &self.paths, (patches, &rows.emerged), &entering, &visible);
+        }
     }
 
     /// Adds to the caches of pass number `pass`, which have the light that comes straight from the lights, all other light.
@@ -131,16 +195,22 @@ impl Indirect {
         caches: &mut [Option<Cache>],
         pass: u32,
         tally: &mut Tally,
-    ) {
+    ) -> Walks {
         let start = std::time::Instant::now();
         let trees = tally.clock.tree;
-        let round = Round { of: self, view, lights, plans, turn: Turn::of(self.seed, pass) };
-        let mut rows: Rows = vec![Vec::new(); plans.len()];
+        let patches: Vec<Option<Patches>> =
+            self.walked.par_iter().map(|body| Some(body.as_ref()?.patches(pass))).collect();
+        let round = self.round((view, lights), plans, Turn::of(self.seed, pass), &patches);
+        let mut rows = Rows::new(plans.len());
         for plan in plans.iter().flatten() {
             round.backwards(plan, &mut rows, tally);
             round.mirrored(plan, &mut rows, tally);
         }
         keep(caches, &rows, tally);
+        if !self.walked.is_empty() {
+            tally.clock.fill += start.elapsed().as_secs_f64() - (tally.clock.tree - trees);
+            return Walks { patches, emerged: rows.emerged };
+        }
         // The first round has all light so far, each later one what the one before brought.
         let mut sources: Vec<Option<Cache>> = caches.to_vec();
         let whole: f64 = sources.iter().flatten().map(flux).sum();
@@ -152,13 +222,13 @@ impl Indirect {
                 }
                 break;
             }
-            let mut rows: Rows = vec![Vec::new(); plans.len()];
+            let mut rows = Rows::new(plans.len());
             for (plan, source) in plans.iter().zip(&mut sources) {
                 if let (Some(plan), Some(source)) = (plan, source.take()) {
                     round.forwards(plan, source, (whole, level, pass), &mut rows, tally);
                 }
             }
-            if rows.iter().all(Vec::is_empty) {
+            if rows.of.iter().all(Vec::is_empty) {
                 break;
             }
             keep(caches, &rows, tally);
@@ -166,9 +236,10 @@ impl Indirect {
                 rows.retain(CachedSample::is_finite);
                 cache.as_ref().filter(|_| !rows.is_empty()).map(|_| Cache { lit: rows, attempted: 1 })
             };
-            sources = rows.into_iter().zip(caches.iter()).map(source).collect();
+            sources = rows.of.into_iter().zip(caches.iter()).map(source).collect();
         }
         tally.clock.fill += start.elapsed().as_secs_f64() - (tally.clock.tree - trees);
+        Walks::default()
     }
 }
 
@@ -180,7 +251,7 @@ fn flux(cache: &Cache) -> f64 {
 
 /// Samples that stand for all of their flux, beside those that stand for it all together.
 fn keep(caches: &mut [Option<Cache>], rows: &Rows, tally: &mut Tally) {
-    for (cache, rows) in caches.iter_mut().zip(rows) {
+    for (cache, rows) in caches.iter_mut().zip(&rows.of) {
         let Some(cache) = cache else { continue };
         let times = cache.attempted as f32;
         let whole = rows.iter().map(|row| CachedSample { flux: row.flux * times, ..*row });
@@ -200,7 +271,12 @@ impl Round<'_> {
             .map(|chunk| {
                 let mut found = Found::default();
                 let first = chunk * CHUNK as u64;
-                (first..(first + CHUNK as u64).min(numbers.end)).for_each(|i| task(i, &mut found));
+                for i in first..(first + CHUNK as u64).min(numbers.end) {
+                    task(i, &mut found);
+                    while let Some((ray, flux, draws)) = found.open.pop() {
+                        self.followed.follow(ray, flux, draws, &mut found);
+                    }
+                }
                 found
             })
             .collect();
@@ -231,7 +307,7 @@ impl Round<'_> {
             }
             let flux = light * (PI * weight / self.of.count as f32);
             let arrived = Arrived { plan, at, w, flux };
-            self.enter(&arrived, depth, draws, found);
+            self.followed.enter(&arrived, depth, draws, found);
         });
     }
 
@@ -250,11 +326,11 @@ impl Round<'_> {
             let mut draws = PathSampler::new(&[], hash_combine(key, i));
             let mirrored = reflectance(plan.body.eta, w.dot(at.n));
             let away = reflect(w, at.n);
-            self.follow(Ray::new(at.leave(away), away), flux * mirrored, draws.fork(0), found);
+            self.followed.follow(Ray::new(at.leave(away), away), flux * mirrored, draws.fork(0), found);
             let passed = transmittance(plan.body.eta, w.dot(at.n));
             let arrived = Arrived { plan, at, w, flux: flux * passed };
-            if let Some((ray, flux)) = self.walk(&arrived, &mut draws, found) {
-                self.follow(ray, flux, draws, found);
+            if let Some((ray, flux)) = self.followed.walk(&arrived, &mut draws, found) {
+                self.followed.follow(ray, flux, draws, found);
             }
         });
     }
@@ -318,7 +394,12 @@ impl Round<'_> {
                 for ((at, point), sum) in places.iter().zip(&points).zip(&sums) {
                     let w = point.exit.w;
                     let flux = *sum * (each * transmittance(plan.body.eta, w.dot(at.n)));
-                    self.follow(Ray::new(at.leave(w), w), flux, PathSampler::new(&[], point.stream.key()), &mut found);
+                    self.followed.follow(
+                        Ray::new(at.leave(w), w),
+                        flux,
+                        PathSampler::new(&[], point.stream.key()),
+                        &mut found,
+                    );
                 }
                 found
             })
@@ -326,144 +407,9 @@ impl Round<'_> {
         collect(chunks, rows, tally);
     }
 
-    /// Follows light along `ray` until nothing is left of it.
-    fn follow(&self, mut ray: Ray, mut flux: Rgb, mut draws: PathSampler, found: &mut Found) {
-        for _ in 0..self.of.bounces {
-            if !flux.is_finite() {
-                found.tally.gather.non_finite += 1;
-                return;
-            }
-            if flux.is_black() {
-                return;
-            }
-            found.tally.rays.bounce += 1;
-            let Some(hit) = self.view.rays.closest(&ray) else { return };
-            let at = self.view.point(&hit, ray.direction);
-            let surface = self.view.scene.surface(hit.mesh);
-            if surface.emission.is_some() {
-                return;
-            }
-            let w = -ray.direction;
-            if let Some(plan) = &self.plans[hit.mesh as usize] {
-                let outside = self.view.outwards(&hit).n_geometric.dot(w) > 0.0;
-                if !outside {
-                    return;
-                }
-                let at = SurfacePoint { n: at.n_geometric, ..at };
-                let depth = draws.number();
-                let Some(next) = self.goes_on(&Arrived { plan, at, w, flux }, depth, &mut draws, found) else { return };
-                (ray, flux) = next;
-                continue;
-            }
-            if surface.clear.is_some() {
-                let (way, tally) = ((&hit, ray.direction), &mut found.tally);
-                let Some(next) = self.of.paths.past_clear(self.view, way, flux, &mut draws, tally) else { return };
-                (ray, flux) = next;
-                continue;
-            }
-            let Some(next) = surface.bsdf.sample(&at, w, [draws.number(), draws.number(), draws.number()]) else {
-                return;
-            };
-            let after = flux * next.weight;
-            // Roulette: what has lost some of its flux goes on by the chance of what is left.
-            let chance = (after.max() / flux.max()).min(1.0);
-            if draws.number() >= chance || at.n_geometric.dot(next.wi) <= 0.0 {
-                return;
-            }
-            flux = after * (1.0 / chance);
-            ray = Ray::new(at.leave(next.wi), next.wi);
-        }
-    }
-
-    /// A sample of what enters, and what is left of the light followed.
-    fn enter(&self, arrived: &Arrived<'_>, depth: f32, mut draws: PathSampler, found: &mut Found) {
-        if let Some((ray, flux)) = self.goes_on(arrived, depth, &mut draws, found) {
-            self.follow(ray, flux, draws, found);
-        }
-    }
-
-    /// A sample of what enters; the light goes on mirrored, by the chance of it, or by what the model lacks.
-    fn goes_on(
-        &self,
-        arrived: &Arrived<'_>,
-        depth: f32,
-        draws: &mut PathSampler,
-        found: &mut Found,
-    ) -> Option<(Ray, Rgb)> {
-        let &Arrived { plan, at, w, flux } = arrived;
-        let sample = plan.body.enters(&at, w, (flux, 1.0), depth);
-        found.rows.extend(sample.map(|sample| (plan.body.object(), sample)));
-        if draws.number() < reflectance(plan.body.eta, w.dot(at.n)) {
-            let away = reflect(w, at.n);
-            return Some((Ray::new(at.leave(away), away), flux));
-        }
-        let walks = self.of.paths.walks(plan.body.object());
-        let steps = plan.near.is_some();
-        let (step, flux) = match (steps, walks) {
-            (true, true) => (draws.number() < 0.5, flux * 2.0),
-            (step, _) => (step, flux),
-        };
-        let rest = Arrived { flux, ..*arrived };
-        if step { self.step(&rest, draws, found) } else { self.walk(&rest, draws, found) }
-    }
-
-    /// The near part of what entered, let out close to where that was.
-    fn step(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
-        let &Arrived { plan, at, w, flux } = arrived;
-        let near = plan.near.as_ref()?;
-        let key = hash_combine(
-            self.turn.seed,
-            u64::from(draws.number().to_bits()) << 32 | u64::from(draws.number().to_bits()),
-        );
-        let step = near.step(self.view, &plan.body, (at.x, at.n), PixelStream::new(key, 0, 0), &mut found.tally)?;
-        let out = SurfacePoint { n: step.at.n_geometric, ..step.at };
-        let away = cosine_hemisphere(out.n, draws.pair());
-        // The boundary has been passed by the choice not to mirror.
-        let refracted = refract(w, at.n, plan.body.eta)?;
-        let sample = CachedSample {
-            entry: crate::bssrdf::Entry { x: Vec3::ZERO, n: at.n, w: refracted },
-            depth: plan.body.model.sample_depth(draws.number()),
-            flux: flux * (PI * step.weight),
-        };
-        let exit = Exit { x: Vec3::ZERO, n: out.n, w: away };
-        let passed = plan.near_part(near, &exit, &sample, (at.x - step.place).as_vec3(), &mut found.tally)
-            * plan.balance_at(step.place, exit.n);
-        let left = passed * transmittance(plan.body.eta, away.dot(out.n));
-        let chance = (left.max() / flux.max()).min(1.0);
-        let goes_on = draws.number() < chance;
-        goes_on.then(|| (Ray::new(out.leave(away), away), left * (1.0 / chance)))
-    }
-
-    /// What the model of the body lacks: light scattered less often, until it leaves.
-    fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
-        let &Arrived { plan, at, w, flux } = arrived;
-        let inside = refract(w, at.n, plan.body.eta)?;
-        let from = (at.leave(inside), inside);
-        self.of.paths.unmodelled(self.view, plan.body.object(), from, flux, draws, &mut found.tally)
-    }
-
     /// Seed of what a body's paths of one kind draw in this pass.
     fn key(&self, plan: &Plan, kind: u64) -> u64 {
         let pass = hash_combine(self.turn.seed, self.turn.number.into());
         hash_combine(hash_combine(pass, plan.body.object().into()), kind)
-    }
-}
-
-/// Light that comes to a body from outside.
-struct Arrived<'a> {
-    plan: &'a Plan,
-    /// Flat as the triangle it lies on.
-    at: SurfacePoint,
-    /// Unit direction to where it comes from.
-    w: Vec3,
-    /// Before the boundary.
-    flux: Rgb,
-}
-
-/// What tasks found, in their order.
-fn collect(chunks: Vec<Found>, rows: &mut Rows, tally: &mut Tally) {
-    for found in chunks {
-        found.rows.into_iter().for_each(|(object, row)| rows[object as usize].push(row));
-        *tally += found.tally;
     }
 }

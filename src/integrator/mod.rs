@@ -4,6 +4,7 @@
 mod ambient_occlusion;
 mod direct;
 mod first_order;
+mod followed;
 mod indirect;
 mod local;
 mod lost;
@@ -15,6 +16,7 @@ mod single;
 mod subsurface;
 mod trust;
 mod volume_path;
+mod walked;
 
 pub use crate::cache::SubsurfaceOptions;
 use crate::math::Rgb;

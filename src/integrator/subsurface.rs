@@ -6,18 +6,19 @@ use super::parts::{clear_bodies, of_cache};
 use super::shade::DirectLight;
 use super::single::Single;
 use super::volume_path::{Asked, Modelled, Scratch as PathScratch};
+use super::walked::{Exitance, WalkedBody};
 use super::{CameraRay, Integrator, KnownLights, Part, camera_hits};
 use crate::bssrdf::Exit;
 use crate::cache::{Cache, Detail, GatherPoint, Gatherer, Plan, Scratch, SubsurfaceOptions, balance, seen};
-use crate::error::Result;
-use crate::geometry::{Solid, SurfacePoint};
+use crate::error::{Error, Result};
+use crate::geometry::{Patches, Solid, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{Body, EntrySampling, Object, Scene, View};
+use crate::scene::{Body, EntrySampling, Object, Obstacle, Scene, Shape, View};
 use crate::tally::{Clock, Tally};
 use std::sync::{Arc, Once};
 
@@ -46,7 +47,7 @@ impl Subsurface {
     /// Tables for the translucent objects of `scene`, and for no others.
     ///
     /// # Errors
-    /// A translucent material whose model does not exist for its medium.
+    /// A translucent material whose model does not exist for its medium; bodies that paths cannot walk through, where they should.
     pub fn new(scene: &Scene, options: SubsurfaceOptions) -> Result<Self> {
         let objects = 0..scene.objects.len() as u32;
         let translucent = |o: &u32| scene.surface(*o).is_translucent();
@@ -57,8 +58,13 @@ impl Subsurface {
         let lights = Lights::new(scene);
         let plan = |object| Ok(Plan::new(scene, &lights, object, options)?.map(Arc::new));
         let plans: Vec<Option<Arc<Plan>>> = objects.map(plan).collect::<Result<_>>()?;
+        if options.shape == Shape::Walked {
+            can_be_walked(scene, &plans, &options)?;
+        }
         let modelled = modelled(&plans, &options);
-        let indirect = goes_on(scene, &modelled, &options).then(|| Indirect::new(scene, &plans, modelled, &options));
+        let walks = options.shape == Shape::Walked;
+        let indirect =
+            (walks || goes_on(scene, &modelled, &options)).then(|| Indirect::new(scene, &plans, modelled, &options));
         Ok(Self {
             options,
             light: DirectLight { lights, samples: options.light_samples },
@@ -78,6 +84,11 @@ impl Subsurface {
         let black = "`subsurface` without light over other surfaces (`bounces = 0`, `--as-notes`) shows clear bodies black, and lets no \
                      light through; leave that out, or take --method volume_path";
         if scene.has_clear_bodies() { vec![black.into()] } else { Vec::new() }
+    }
+
+    /// Whether paths walk through bodies, and say how much leaves where.
+    pub fn walks(&self) -> bool {
+        self.options.shape == Shape::Walked
     }
 
     /// Number of bodies with a near field.
@@ -124,7 +135,7 @@ impl Subsurface {
     fn all_the_light(
         &self,
         view: View<'_>,
-        (indirect, pass): (&Indirect, &[Option<Gatherer>]),
+        (indirect, pass): (&Indirect, &Lit),
         rays: &[CameraRay],
         hits: &[Option<Hit>],
         out: &mut [Rgb],
@@ -149,7 +160,7 @@ impl Subsurface {
         let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
         for group in asked.chunk_by(|a, b| (a.1.object, a.1.later) == (b.1.object, b.1.later)) {
             let object = group[0].1.object as usize;
-            let (Some(plan), Some(gatherer)) = (&self.plans[object], &pass[object]) else { continue };
+            let (Some(plan), Some(gatherer)) = (&self.plans[object], &pass.caches[object]) else { continue };
             let point = |(_, asked): &(usize, Asked)| {
                 let x = (asked.at.x - plan.body.table().centre()).as_vec3();
                 let exit = Exit { x, n: asked.at.normal_seen_from(asked.w), w: asked.w };
@@ -158,8 +169,10 @@ impl Subsurface {
             let points: Vec<GatherPoint> = group.iter().map(point).collect();
             let detail = if group[0].1.later { Detail::Coarse } else { Detail::Fine };
             plan.gather((view, &self.light.lights), (gatherer, detail), &points, &mut scratch, tally, &mut sums);
-            for ((i, asked), sum) in group.iter().zip(&sums) {
-                out[*i] += *sum * asked.weight;
+            let walked = pass.walked.get(object).and_then(Option::as_ref);
+            for (((i, asked), point), sum) in group.iter().zip(&points).zip(&sums) {
+                let sum = walked.map_or(*sum, |walked| walked.radiance(&asked.at, &point.exit, *sum));
+                out[*i] += sum * asked.weight;
             }
         }
     }
@@ -201,14 +214,42 @@ impl Subsurface {
     }
 }
 
+/// That paths can walk through the bodies of `plans`.
+fn can_be_walked(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Result<()> {
+    let remedy = "leave out `shape = \"walked\"`";
+    if options.bounces == 0 {
+        let what = "`shape = \"walked\"` is of all the light, and `bounces = 0` of what comes straight from lights";
+        return Err(Error::scene(format!("{what}: leave out one of them")));
+    }
+    let mut refusals: Vec<String> = scene.obstacles().iter().filter_map(Obstacle::refusal).collect();
+    let meets = |plan: &&Plan| scene.nests().meets[plan.body.object() as usize] && plan.body.union.is_none();
+    refusals.extend(plans.iter().flatten().map(|plan| &**plan).filter(meets).map(|plan| {
+        let name = &scene.objects[plan.body.object() as usize].name;
+        format!("{name:?} touches or overlaps another body, and `shape = \"walked\"` takes each as alone: take --method volume_path, or")
+    }));
+    match refusals.is_empty() {
+        true => Ok(()),
+        false => Err(Error::scene(format!("{} {remedy}", refusals.join("\n")))),
+    }
+}
+
+/// The light of a pass.
+pub struct Lit {
+    caches: Vec<Option<Gatherer>>,
+    /// Of bodies that are walked through; empty where none are.
+    walked: Vec<Option<Exitance>>,
+}
+
 /// How paths meet each body.
 fn modelled(plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
     let of = |plan: &Option<Arc<Plan>>| {
         let plan = plan.as_ref()?;
         let once = options.single && !plan.body.model.claims().first_order;
         let clear = lets_light_through(&plan.body.body, plan.medium());
-        let near = plan.near.as_ref().map(|_| plan.clone());
-        Some(Modelled { eta: plan.body.eta, clear, once, near })
+        let walked = options.shape == Shape::Walked;
+        // What comes over other surfaces is in what the paths bring.
+        let near = plan.near.as_ref().filter(|_| !walked).map(|_| plan.clone());
+        Some(Modelled { eta: plan.body.eta, clear, once, near, walked })
     };
     plans.iter().map(of).collect()
 }
@@ -251,7 +292,7 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
 }
 
 impl Integrator for Subsurface {
-    type Pass = Vec<Option<Gatherer>>;
+    type Pass = Lit;
 
     fn begin_pass(&self, view: View<'_>, pass: u32, tally: &mut Tally) -> Self::Pass {
         let lights = &self.light.lights;
@@ -259,7 +300,10 @@ impl Integrator for Subsurface {
             self.surveyed.call_once(|| {
                 let each = self.plans.iter().zip(seen(view));
                 each.for_each(|(plan, seen)| plan.iter().for_each(|plan| plan.survey(view, lights, &seen)));
-                if self.indirect.is_some() {
+                if let Some(indirect) = &self.indirect {
+                    indirect.survey(view, lights, &self.plans);
+                }
+                if self.indirect.is_some() && self.options.shape == Shape::HalfSpace {
                     let seed = self.options.seed;
                     for plan in self.plans.iter().flatten() {
                         let clear = lets_light_through(&plan.body.body, plan.medium());
@@ -270,12 +314,20 @@ impl Integrator for Subsurface {
         });
         let mut fill = |plan: &Option<Arc<Plan>>| Some(plan.as_ref()?.fill(view, lights, pass, tally));
         let mut caches: Vec<Option<Cache>> = self.plans.iter().map(&mut fill).collect();
-        if let Some(indirect) = &self.indirect {
-            indirect.add(view, lights, &self.plans, &mut caches, pass, tally);
-        }
+        let walks = self
+            .indirect
+            .as_ref()
+            .map(|indirect| indirect.add(view, lights, &self.plans, &mut caches, pass, tally))
+            .unwrap_or_default();
         let ready =
             |(plan, cache): (&Option<Arc<Plan>>, Option<Cache>)| Some(plan.as_ref()?.ready(cache?, pass, tally));
-        self.plans.iter().zip(caches).map(ready).collect()
+        let caches: Vec<Option<Gatherer>> = self.plans.iter().zip(caches).map(ready).collect();
+        let bodies = self.indirect.iter().flat_map(|indirect| &indirect.walked);
+        let exitance = |((body, patches), cache): ((&Option<WalkedBody>, Option<Patches>), &Option<Gatherer>)| {
+            Some(body.as_ref()?.exitance((view, lights), (cache.as_ref()?, pass), patches?, &walks.emerged, tally))
+        };
+        let walked = bodies.zip(walks.patches).zip(&caches).map(exitance).collect();
+        Lit { caches, walked }
     }
 
     fn radiance(&self, view: View<'_>, pass: &Self::Pass, rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
@@ -284,7 +336,7 @@ impl Integrator for Subsurface {
             self.all_the_light(view, (indirect, pass), rays, &hits, out, tally);
             return;
         }
-        let inside = self.inside(view, pass, rays, &hits, tally);
+        let inside = self.inside(view, &pass.caches, rays, &hits, tally);
         for (((ray, hit), inside), out) in rays.iter().zip(&hits).zip(inside).zip(out) {
             *out = match hit {
                 None => self.light.lights.environment(ray.ray.direction),

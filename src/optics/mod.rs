@@ -9,6 +9,7 @@ mod medium;
 mod moments;
 mod phase;
 mod validity;
+mod way_out;
 
 pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
 pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
@@ -18,3 +19,4 @@ pub use medium::{Medium, Reduced};
 pub use moments::FresnelMoments;
 pub use phase::HenyeyGreenstein;
 pub use validity::{ChannelOptics, Trust};
+pub use way_out::{Moments, WayOut};

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::film::{Film, Image, Window, variance};
 use crate::integrator::{View, lost};
 use crate::query;
-use crate::scene::{Estimator, Material, MethodName, Object, Scene, SceneFile, Translucent};
+use crate::scene::{Estimator, Material, MethodName, Object, Scene, SceneFile, Shape, Translucent};
 use crate::words::counted;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -155,6 +155,7 @@ impl Prepared {
         let &Options { as_notes, repair, .. } = options;
         if as_notes {
             file.method.model = Some(ModelName::STANDARD);
+            file.method.shape = Some(Shape::HalfSpace);
         }
         let mut scene = Scene::load_with(&file, repair)?;
         if as_notes {

@@ -33,7 +33,7 @@ pub use file::{CameraEntry, FovAxis, SceneFile};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
-pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Spread};
+pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread};
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
 
 // For what is above this room.

@@ -120,6 +120,15 @@ named! {
     Area = "area"
 }
 
+named! {
+    /// What decides how much light leaves a body where.
+    Shape, "shape",
+    /// The model alone, as on a plane.
+    HalfSpace = "half-space",
+    /// Paths walked through the body itself, patch by patch; the model has what is finer than a patch.
+    Walked = "walked"
+}
+
 /// `[method]`: what is computed. Everything may be absent; the integrator knows the defaults.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MethodOptions {
@@ -147,6 +156,8 @@ pub struct MethodOptions {
     pub single: Option<bool>,
     /// Subsurface and path: surfaces that light may go over, 0 to 2^24; as many as it takes if absent.
     pub bounces: Option<u32>,
+    /// Subsurface: what decides how much light leaves where.
+    pub shape: Option<Shape>,
     /// Volume path: the scattering orders that are wanted.
     pub orders: Option<Orders>,
     /// Volume path: photons per pass and translucent object, 0 to 2^24.

@@ -69,6 +69,11 @@ pub trait WalkObserver {
         draws: &mut PathSampler,
     ) -> bool;
 
+    /// Whether it decides itself which paths of little weight go on.
+    fn plays_roulette(&self) -> bool {
+        false
+    }
+
     /// A lamp inside the body ends the path, which came to it along `w`.
     fn lamp(&mut self, _hit: &Hit, _w: Vec3, _spectrum: &Spectrum) {}
 
@@ -267,7 +272,7 @@ impl Interior {
                     if !watch.collision(x, w, edge_here, spectrum, draws) {
                         return None;
                     }
-                    if collisions % self.patience == 0 {
+                    if collisions % self.patience == 0 && !watch.plays_roulette() {
                         let left = spectrum.value(&self.medium).max() / whole;
                         if !russian_roulette(left / ROULETTE_BELOW, spectrum, draws) {
                             return None;

@@ -23,6 +23,7 @@ mod photons;
 mod sight;
 mod spectrum;
 mod through;
+mod windows;
 
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, KnownLights, Part, View};
@@ -50,6 +51,7 @@ pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
 use through::RefractedNee;
+pub(super) use windows::{Out, Windows};
 
 /// Options of [`VolumePath`].
 #[derive(Clone, Copy, Debug)]
@@ -279,7 +281,7 @@ impl VolumePath {
     pub(super) fn once(scene: &Scene, wanted: impl Fn(usize) -> bool, seed: u64) -> Self {
         let options = VolumePathOptions { orders: Orders::Single, photons: 0, specular: false, seed };
         let surfaces = Self::surfaces(scene, options);
-        let bodies = endless(scene, wanted);
+        let bodies = endless(scene, 1, wanted);
         Self { throughs: throughs(scene, &surfaces.light.lights, &bodies), bodies, once: true, ..surfaces }
     }
 
@@ -348,14 +350,14 @@ fn matched(body: Interior) -> Interior {
 }
 
 /// The bodies that `wanted` names. Holes of meshes and objects in one another are no fault: the models beside know nothing of them either.
-fn endless(scene: &Scene, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior>> {
+fn endless(scene: &Scene, cells: u32, wanted: impl Fn(usize) -> bool) -> Vec<Option<Interior>> {
     let lone = |interior: Interior| {
         let union = scene.union(interior.object).cloned();
         // Where its own parts lie in each other is no face of another body.
         let contacts = if union.is_some() { Contacts::new() } else { interior.contacts };
         Interior { endless: true, nested: false, union, contacts, ..interior }
     };
-    let of = |i| if wanted(i) { interior(scene, i, 1).map(lone) } else { None };
+    let of = |i| if wanted(i) { interior(scene, i, cells).map(lone) } else { None };
     (0..scene.objects.len()).map(of).collect()
 }
 

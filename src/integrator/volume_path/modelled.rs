@@ -7,7 +7,7 @@ use super::glass;
 use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
-use super::{Asked, VolumePath, VolumePathOptions, endless, throughs};
+use super::{Asked, CLEARANCE_CELLS, VolumePath, VolumePathOptions, endless, throughs};
 use crate::bssrdf::Exit;
 use crate::cache::{Plan, Step};
 use crate::geometry::SurfacePoint;
@@ -31,6 +31,8 @@ pub struct Modelled {
     pub clear: bool,
     /// Whether light scattered once is no part of the model.
     pub once: bool,
+    /// Whether paths walk through it themselves.
+    pub walked: bool,
     /// Where light that comes over other surfaces and enters close to an exit is no part of the cache: paths step there.
     pub near: Option<Arc<Plan>>,
 }
@@ -69,7 +71,8 @@ impl VolumePath {
     ) -> Self {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, ..options };
         let surfaces = Self::surfaces(scene, options);
-        let walked = endless(scene, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once));
+        let cells = if modelled.iter().flatten().any(|m| m.walked) { CLEARANCE_CELLS } else { 1 };
+        let walked = endless(scene, cells, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once || m.walked));
         let clear = glass::clear_bodies(scene);
         let bodies: Vec<Option<Interior>> = walked.into_iter().zip(clear).map(|(body, clear)| clear.or(body)).collect();
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
@@ -152,7 +155,7 @@ impl VolumePath {
     }
 
     /// The body of object number `object`, where paths walk in it.
-    fn body(&self, object: u32) -> Option<&Interior> {
+    pub(super) fn body(&self, object: u32) -> Option<&Interior> {
         self.bodies[object as usize].as_ref()
     }
 }
