@@ -426,7 +426,8 @@ mod tests {
         ] {
             let medium = Medium::unreduced(Rgb::splat(alpha), Rgb::splat(1.0 - alpha), g, eta).unwrap();
             let slab = Slab::new(&medium, thickness, true).unwrap();
-            let ([r, t], found) = ([r, t].map(f64::from), [slab.total(), slab.total_transmitted()].map(|v| f64::from(v[0])));
+            let ([r, t], found) =
+                ([r, t].map(f64::from), [slab.total(), slab.total_transmitted()].map(|v| f64::from(v[0])));
             assert!((found[0] / r - 1.0).abs() < 0.1 && (found[1] / t - 1.0).abs() < 0.12, "{thickness}: {found:?}");
         }
     }
