@@ -10,6 +10,7 @@ use marmor::integrator::{Integrator, Subsurface, SubsurfaceOptions, VolumePath, 
 use marmor::scene::{Scene, SceneFile, Shape};
 use parts::{camera, centred, diffuse, emissive, mesh, rectangle, sky, sphere, translucent};
 use rendering::{Within, agree, channels, film, load, load_beside, means_of, run};
+use std::f64::consts::{PI, TAU};
 use std::path::Path;
 
 fn walked(seed: u64) -> SubsurfaceOptions {
@@ -130,6 +131,25 @@ fn threads_and_ranges_change_no_bit() {
     assert!(one == passes(2, &[0, 1, 3, 5]), "ranges");
 }
 
+/// A ball without one of its triangles, out of which no walk would come back.
+fn ball_with_a_hole() -> String {
+    let (rings, segments) = (16, 32);
+    let mut text = String::new();
+    for i in 0..=rings {
+        for j in 0..segments {
+            let (a, b) = (PI * f64::from(i) / f64::from(rings), TAU * f64::from(j) / f64::from(segments));
+            text += &format!("v {:.9} {:.9} {:.9}\n", a.sin() * b.cos(), a.cos(), a.sin() * b.sin());
+        }
+    }
+    let at = |i: i32, j: i32| i * segments + j % segments + 1;
+    for i in 0..rings {
+        for j in (0..segments).filter(|j| (i, *j) != (8, 3)) {
+            text += &format!("f {} {} {} {}\n", at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j));
+        }
+    }
+    text
+}
+
 /// What it cannot walk through is refused by name; with `bounces = 0` there is nothing to walk.
 #[test]
 fn what_has_no_inside_is_refused() {
@@ -145,6 +165,9 @@ fn what_has_no_inside_is_refused() {
     };
     let open = ball.clone() + &mesh("leaf", "open.obj", "m");
     refused(&open, walked(1), &["leaf", "shape = \"walked\""]);
+    let scene = load_beside("holed.obj", &ball_with_a_hole(), &(ball.clone() + &mesh("sieve", "holed.obj", "m")));
+    let told = Subsurface::new(&scene, walked(1)).err().unwrap().to_string();
+    assert!(told.contains("\"sieve\" has holes") && told.contains("shape = \"walked\""), "{told}");
     let closed = ball.clone() + &sphere("body", [0.0; 3], 1.0, 16, "m");
     refused(&closed, SubsurfaceOptions { bounces: 0, ..walked(1) }, &["bounces = 0", "shape = \"walked\""]);
     let other = "[material.oil]\ntype = \"translucent\"\nsigma_s = [2, 2, 2]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3\n";

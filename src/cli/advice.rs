@@ -139,7 +139,10 @@ impl<'a> Advice<'a> {
 
     /// That the model need not be all, where paths can walk through the body.
     fn walk(&self, t: &Trustworthiness) -> Option<String> {
-        let can = matches!(self.prepared.method, Method::Subsurface(_)) && !self.prepared.as_notes;
+        let method = &self.prepared.file.method;
+        let can = matches!(&self.prepared.method, Method::Subsurface(s) if !s.walks())
+            && !self.prepared.as_notes
+            && method.bounces != Some(0);
         let wanted = t.verdict != Verdict::Trust && t.untraceable.is_none();
         (can && wanted).then(|| "--shape walked: within some percent".into())
     }

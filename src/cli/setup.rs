@@ -109,8 +109,8 @@ impl MethodArgs {
                 return Err(Error::usage(unknown_word(spec, word)));
             }
         }
-        if args.as_notes && (args.model.is_some() || args.estimator.is_some()) {
-            return Err(Error::usage(format!("`{spec}`: as_notes has its own model and estimator")));
+        if args.as_notes && (args.model.is_some() || args.estimator.is_some() || args.shape.is_some()) {
+            return Err(Error::usage(format!("`{spec}`: as_notes has its own model, estimator and shape")));
         }
         Ok(args)
     }

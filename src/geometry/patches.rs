@@ -28,6 +28,7 @@ pub struct Facet {
 pub struct Facets {
     all: Vec<Facet>,
     normal: f32,
+    largest_in_all: f64,
 }
 
 impl Facets {
@@ -72,12 +73,19 @@ impl Facets {
             }
         }
         let radius = (area / (4.0 * std::f64::consts::PI)).sqrt();
-        Self { all, normal: (NORMAL * radius) as f32 }
+        let largest = all.iter().map(|f| f.area).fold(0.0, f32::max);
+        let largest_in_all = if largest > 0.0 { area / f64::from(largest) } else { 0.0 };
+        Self { all, normal: (NORMAL * radius) as f32, largest_in_all }
     }
 
     /// How many.
     pub fn count(&self) -> usize {
         self.all.len()
+    }
+
+    /// All of the area over that of the largest one.
+    pub fn largest_in_all(&self) -> f64 {
+        self.largest_in_all
     }
 }
 
@@ -87,6 +95,9 @@ struct Split {
     axis: u8,
     at: f32,
 }
+
+/// All on one side.
+const WHOLE: Split = Split { axis: 0, at: f32::NEG_INFINITY };
 
 /// A surface cut in 2^depth patches.
 pub struct Patches {
@@ -193,7 +204,7 @@ fn key(axes: &[Vec3; 3], normal: f32, x: Vec3, n: Vec3) -> [f32; AXES] {
 /// Across the widest spread of some facets, in the middle of their area.
 fn cut(all: &[Facet], keys: &[[f32; AXES]], own: &[u32], seed: u64) -> Split {
     if own.len() < 2 {
-        return Split::default();
+        return WHOLE;
     }
     let mut tried: Vec<u32> = match own.len() {
         0..=TRIED => own.to_vec(),
@@ -220,7 +231,7 @@ fn cut(all: &[Facet], keys: &[[f32; AXES]], own: &[u32], seed: u64) -> Split {
     let apart = (1..tried.len()).filter(|&k| value(k - 1) < value(k)).min_by_key(|k| k.abs_diff(middle));
     match apart {
         Some(k) => Split { axis: axis as u8, at: 0.5 * (value(k - 1) + value(k)) },
-        None => Split::default(),
+        None => WHOLE,
     }
 }
 

@@ -19,14 +19,14 @@ use std::sync::Arc;
 pub struct Rows {
     /// Samples of each object.
     pub of: Vec<Vec<CachedSample>>,
-    /// What left bodies that are walked through.
-    pub emerged: Vec<Emerged>,
+    /// What left each, of those that are walked through.
+    pub emerged: Vec<Vec<Emerged>>,
 }
 
 impl Rows {
     /// None of so many objects.
     pub fn new(objects: usize) -> Self {
-        Self { of: vec![Vec::new(); objects], emerged: Vec::new() }
+        Self { of: vec![Vec::new(); objects], emerged: vec![Vec::new(); objects] }
     }
 }
 
@@ -37,8 +37,10 @@ pub struct Found {
     pub rows: Vec<(u32, CachedSample)>,
     /// What left bodies that are walked through.
     pub emerged: Vec<Emerged>,
-    /// Light that goes on, to be followed.
-    pub open: Vec<(Ray, Rgb, PathSampler)>,
+    /// Light that has come out of bodies and goes on, each part over so many surfaces.
+    open: Vec<(Ray, Rgb, PathSampler, u32)>,
+    /// Surfaces that are left to what is followed now.
+    left: u32,
     /// What it cost.
     pub tally: Tally,
 }
@@ -74,9 +76,23 @@ pub struct Followed<'a> {
 }
 
 impl Followed<'_> {
-    /// Follows light along `ray` until nothing is left of it.
-    pub fn follow(&self, mut ray: Ray, mut flux: Rgb, mut draws: PathSampler, found: &mut Found) {
-        for _ in 0..self.bounces {
+    /// Follows light along `ray` until nothing is left of it, and what has come of it out of bodies that it was walked through.
+    pub fn follow(&self, ray: Ray, flux: Rgb, draws: PathSampler, found: &mut Found) {
+        found.left = self.bounces;
+        self.follow_one(ray, flux, draws, found);
+        self.follow_open(found);
+    }
+
+    fn follow_open(&self, found: &mut Found) {
+        while let Some((ray, flux, draws, left)) = found.open.pop() {
+            found.left = left;
+            self.follow_one(ray, flux, draws, found);
+        }
+    }
+
+    fn follow_one(&self, mut ray: Ray, mut flux: Rgb, mut draws: PathSampler, found: &mut Found) {
+        while found.left > 0 {
+            found.left -= 1;
             if !flux.is_finite() {
                 found.tally.gather.non_finite += 1;
                 return;
@@ -125,9 +141,20 @@ impl Followed<'_> {
 
     /// A sample of what enters, and what is left of the light followed.
     pub fn enter(&self, arrived: &Arrived<'_>, depth: f32, mut draws: PathSampler, found: &mut Found) {
+        found.left = self.bounces;
         if let Some((ray, flux)) = self.goes_on(arrived, depth, &mut draws, found) {
-            self.follow(ray, flux, draws, found);
+            self.follow_one(ray, flux, draws, found);
         }
+        self.follow_open(found);
+    }
+
+    /// Light that has passed the boundary, without a sample: what the cache has no need of.
+    pub fn pass_on(&self, arrived: &Arrived<'_>, mut draws: PathSampler, found: &mut Found) {
+        found.left = self.bounces;
+        if let Some((ray, flux)) = self.walk(arrived, &mut draws, found) {
+            self.follow_one(ray, flux, draws, found);
+        }
+        self.follow_open(found);
     }
 
     /// A sample of what enters; the light goes on mirrored, by the chance of it, or by what the model lacks.
@@ -184,7 +211,7 @@ impl Followed<'_> {
     }
 
     /// What the model of the body lacks: light scattered less often, until it leaves.
-    pub fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
+    fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
         let inside = refract(w, at.n, plan.body.eta)?;
         let from = (at.leave(inside), inside);
@@ -192,8 +219,12 @@ impl Followed<'_> {
         if let (Some(Some(body)), Some(Some(patches))) =
             (self.walked.get(object as usize), self.patches.get(object as usize))
         {
-            let Found { emerged, open, tally, .. } = found;
-            let each = |Out { exit, flux, order, draws }: Out, _: &mut Tally| {
+            let Found { emerged, open, tally, left, .. } = found;
+            let each = |Out { exit, flux, order, draws }: Out, tally: &mut Tally| {
+                if !flux.is_finite() {
+                    tally.gather.non_finite += 1;
+                    return;
+                }
                 if order > body.most {
                     emerged.push(Emerged {
                         object,
@@ -203,7 +234,7 @@ impl Followed<'_> {
                         n: exit.at.n_geometric,
                     });
                 }
-                open.push((Ray::new(exit.at.leave(exit.w), exit.w), flux, draws));
+                open.push((Ray::new(exit.at.leave(exit.w), exit.w), flux, draws, *left));
             };
             self.paths.walk_through((self.view, object), (from, flux), body.windows(), draws.fork(1), tally, each);
             return None;
@@ -216,7 +247,7 @@ impl Followed<'_> {
 pub fn collect(chunks: Vec<Found>, rows: &mut Rows, tally: &mut Tally) {
     for found in chunks {
         found.rows.into_iter().for_each(|(object, row)| rows.of[object as usize].push(row));
-        rows.emerged.extend(found.emerged);
+        found.emerged.into_iter().for_each(|emerged| rows.emerged[emerged.object as usize].push(emerged));
         *tally += found.tally;
     }
 }

@@ -63,7 +63,7 @@ pub struct Walks {
     /// One for each body.
     pub patches: Vec<Option<Patches>>,
     /// All that left them.
-    pub emerged: Vec<Emerged>,
+    pub emerged: Vec<Vec<Emerged>>,
 }
 
 /// What all tasks of a pass share.
@@ -91,8 +91,10 @@ impl Indirect {
         };
         let surfaces = scene.objects.iter().any(reflects) && plans.iter().any(Option::is_some);
         let own = hash_combine(seed, PURPOSE);
-        let body =
-            |(object, plan): (&Object, &Option<Arc<Plan>>)| Some(WalkedBody::new(&object.mesh, plan.as_ref()?, seed));
+        let count = (options.cache_samples / SAMPLES_PER_PATH).max(1);
+        let body = |(object, plan): (&Object, &Option<Arc<Plan>>)| {
+            Some(WalkedBody::new(&object.mesh, plan.as_ref()?, count, seed))
+        };
         let walked = match options.shape {
             Shape::Walked => scene.objects.iter().zip(plans).map(body).collect(),
             _ => Vec::new(),
@@ -109,7 +111,7 @@ impl Indirect {
             surfaces: surfaces
                 .then(|| VolumePath::over_surfaces(scene, vec![None; scene.objects.len()], bounces - 1, seed)),
             bounces,
-            count: (options.cache_samples / SAMPLES_PER_PATH).max(1),
+            count,
             seed: own,
             walked,
             streams: (0..scene.objects.len() as u64).map(streams).collect(),
@@ -182,7 +184,8 @@ impl Indirect {
                 (!flux.is_black()).then(|| (at.x, flux * passed))
             };
             let entering: Vec<_> = (0..u64::from(self.count)).into_par_iter().filter_map(entering).collect();
-            body.learn(view, &self.paths, (patches, &rows.emerged), &entering, &visible);
+            let emerged = &rows.emerged[plan.body.object() as usize];
+            body.learn(view, &self.paths, (patches, emerged), &entering, &visible);
         }
     }
 
@@ -273,9 +276,6 @@ impl Round<'_> {
                 let first = chunk * CHUNK as u64;
                 for i in first..(first + CHUNK as u64).min(numbers.end) {
                     task(i, &mut found);
-                    while let Some((ray, flux, draws)) = found.open.pop() {
-                        self.followed.follow(ray, flux, draws, &mut found);
-                    }
                 }
                 found
             })
@@ -307,6 +307,8 @@ impl Round<'_> {
             }
             let flux = light * (PI * weight / self.of.count as f32);
             let arrived = Arrived { plan, at, w, flux };
+            // What picked the light must not pick too which part of it goes on.
+            let draws = if self.of.walked.is_empty() { draws } else { draws.fork(2) };
             self.followed.enter(&arrived, depth, draws, found);
         });
     }
@@ -323,15 +325,13 @@ impl Round<'_> {
                 return;
             }
             let flux = flux * (1.0 / self.of.count as f32);
-            let mut draws = PathSampler::new(&[], hash_combine(key, i));
+            let draws = PathSampler::new(&[], hash_combine(key, i));
             let mirrored = reflectance(plan.body.eta, w.dot(at.n));
             let away = reflect(w, at.n);
             self.followed.follow(Ray::new(at.leave(away), away), flux * mirrored, draws.fork(0), found);
             let passed = transmittance(plan.body.eta, w.dot(at.n));
             let arrived = Arrived { plan, at, w, flux: flux * passed };
-            if let Some((ray, flux)) = self.followed.walk(&arrived, &mut draws, found) {
-                self.followed.follow(ray, flux, draws, found);
-            }
+            self.followed.pass_on(&arrived, draws, found);
         });
     }
 

@@ -18,8 +18,9 @@ use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{Body, EntrySampling, Object, Obstacle, Scene, Shape, View};
+use crate::scene::{Body, EntrySampling, Object, Obstacle, ObstacleKind, Scene, Shape, View};
 use crate::tally::{Clock, Tally};
+use crate::words::digits;
 use std::sync::{Arc, Once};
 
 /// A cached sample, its columns twice while the tree is built, and its share of the tree.
@@ -79,7 +80,9 @@ impl Subsurface {
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         if let Some(indirect) = &self.indirect {
-            return indirect.paths.warnings(scene);
+            let plans = self.plans.iter().flatten().filter(|_| self.walks());
+            let long = plans.filter_map(|plan| long_walks(scene, plan));
+            return indirect.paths.warnings(scene).into_iter().chain(long).collect();
         }
         let black = "`subsurface` without light over other surfaces (`bounces = 0`, `--as-notes`) shows clear bodies black, and lets no \
                      light through; leave that out, or take --method volume_path";
@@ -216,21 +219,50 @@ impl Subsurface {
 
 /// That paths can walk through the bodies of `plans`.
 fn can_be_walked(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Result<()> {
-    let remedy = "leave out `shape = \"walked\"`";
     if options.bounces == 0 {
         let what = "`shape = \"walked\"` is of all the light, and `bounces = 0` of what comes straight from lights";
         return Err(Error::scene(format!("{what}: leave out one of them")));
     }
     let mut refusals: Vec<String> = scene.obstacles().iter().filter_map(Obstacle::refusal).collect();
-    let meets = |plan: &&Plan| scene.nests().meets[plan.body.object() as usize] && plan.body.union.is_none();
-    refusals.extend(plans.iter().flatten().map(|plan| &**plan).filter(meets).map(|plan| {
-        let name = &scene.objects[plan.body.object() as usize].name;
-        format!("{name:?} touches or overlaps another body, and `shape = \"walked\"` takes each as alone: take --method volume_path, or")
-    }));
-    match refusals.is_empty() {
-        true => Ok(()),
-        false => Err(Error::scene(format!("{} {remedy}", refusals.join("\n")))),
+    for plan in plans.iter().flatten() {
+        let index = plan.body.object() as usize;
+        let (object, name) = (&scene.objects[index], &scene.objects[index].name);
+        let with_another = |o: &Obstacle| o.objects.len() > 1 && o.objects.contains(name);
+        if scene.has(object, ObstacleKind::Holes) {
+            refusals.push(format!(
+                "{}: object {name:?} has holes, out of which walks do not come back: close them",
+                object.at
+            ));
+        }
+        if scene.nests().meets[index] && plan.body.union.is_none() || scene.obstacles().iter().any(with_another) {
+            let what = "touches or overlaps another body, and is walked through as if alone: take --method volume_path";
+            refusals.push(format!("{}: object {name:?} {what}", object.at));
+        }
     }
+    if refusals.is_empty() {
+        return Ok(());
+    }
+    refusals.push("`shape = \"walked\"` is for bodies that paths can walk through: mend that, or leave it out".into());
+    Err(Error::scene(refusals.join("\n")))
+}
+
+/// Collisions of a walk, in the mean, of which a pass takes some seconds or more.
+const LONG: f64 = 3000.0;
+
+/// That walks through a body take long: in a body of volume V and surface S light that enters flies η² 4V/S, whatever its shape, if nothing is absorbed.
+fn long_walks(scene: &Scene, plan: &Plan) -> Option<String> {
+    let object = &scene.objects[plan.body.object() as usize];
+    let sigma_t = f64::from(plan.medium().sigma_t().max());
+    let collisions = 2.0 * f64::from(plan.body.eta).powi(2) * plan.body.body.thickness? * sigma_t;
+    (collisions > LONG).then(|| {
+        format!(
+            "{}: object {:?}: a walk through it has some {} collisions, so that passes take long; to a body so thick a plane is near: \
+             leave out `shape = \"walked\"`",
+            object.at,
+            object.name,
+            digits(collisions, 2)
+        )
+    })
 }
 
 /// The light of a pass.
@@ -245,8 +277,9 @@ fn modelled(plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Opt
     let of = |plan: &Option<Arc<Plan>>| {
         let plan = plan.as_ref()?;
         let once = options.single && !plan.body.model.claims().first_order;
-        let clear = lets_light_through(&plan.body.body, plan.medium());
         let walked = options.shape == Shape::Walked;
+        // Patches have no light that comes straight through, not even through what is thin of a thick body.
+        let clear = walked || lets_light_through(&plan.body.body, plan.medium());
         // What comes over other surfaces is in what the paths bring.
         let near = plan.near.as_ref().filter(|_| !walked).map(|_| plan.clone());
         Some(Modelled { eta: plan.body.eta, clear, once, near, walked })
@@ -324,7 +357,9 @@ impl Integrator for Subsurface {
         let caches: Vec<Option<Gatherer>> = self.plans.iter().zip(caches).map(ready).collect();
         let bodies = self.indirect.iter().flat_map(|indirect| &indirect.walked);
         let exitance = |((body, patches), cache): ((&Option<WalkedBody>, Option<Patches>), &Option<Gatherer>)| {
-            Some(body.as_ref()?.exitance((view, lights), (cache.as_ref()?, pass), patches?, &walks.emerged, tally))
+            let body = body.as_ref()?;
+            let emerged = &walks.emerged[body.plan().body.object() as usize];
+            Some(body.exitance((view, lights), (cache.as_ref()?, pass), patches?, emerged, tally))
         };
         let walked = bodies.zip(walks.patches).zip(&caches).map(exitance).collect();
         Lit { caches, walked }

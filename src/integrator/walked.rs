@@ -4,7 +4,7 @@
 //! light of the cache, are scattered in the body, leave, and enter again. A pass has too few of them for a picture, and enough for the
 //! exitance of patches of the surface. What is finer than a patch the model has: within it the model's own light is scaled, so that the
 //! patch sends out what the paths say. That is linear in the paths, so the mean over passes has the noise of all of them, and the borders of patches
-//! are nowhere in it. Patches become smaller from pass to pass, and with them what is left of the model's error.
+//! are nowhere in it; how light leans is told by sixteen patches together, where a ratio does no harm. Patches become smaller from pass to pass, and with them what is left of the model's error.
 
 use super::View;
 use super::volume_path::{VolumePath, Windows};
@@ -23,12 +23,13 @@ use std::sync::{Arc, OnceLock};
 const DEPTH: f64 = 10.0;
 /// And at most.
 const DEEPEST: f64 = 14.0;
-/// Patches grow in number as passes to this power: their noise in the mean and what they are too coarse for fall alike.
+/// Patches grow in number as passes to this power: the noise of a place, which fewer and fewer paths of a pass serve, and what patches are too
+/// coarse for fall alike.
 const GROWTH: f64 = 1.0 / 3.0;
 /// Facets for each patch of the first passes.
 const FACETS: f64 = 32.0;
-/// And for each at the least.
-const FEWEST: f64 = 8.0;
+/// And for each at the least: area that is told by facets is off by what its borders cut. As many paths for moments.
+const FEWEST: f64 = 32.0;
 /// Parts of a path where light enters, in the mean, for a picture of as many pixels; they grow with the root of its pixels, within bounds.
 const PARTS: (f64, f64) = (2.0, 128.0 * 128.0);
 const PARTS_BOUNDS: [f64; 2] = [1.0, 16.0];
@@ -71,6 +72,8 @@ pub struct WalkedBody {
     plan: Arc<Plan>,
     facets: Facets,
     way_out: WayOut,
+    /// Paths in a pass.
+    paths: u32,
     /// Orders that the camera's own paths bring: up to this.
     pub most: u32,
     seed: u64,
@@ -122,11 +125,11 @@ pub struct Exitance {
 }
 
 impl WalkedBody {
-    /// Of the body of `plan`, whose surface is `mesh`.
-    pub fn new(mesh: &Mesh, plan: &Arc<Plan>, seed: u64) -> Self {
+    /// Of the body of `plan`, whose surface is `mesh`, by so many paths a pass.
+    pub fn new(mesh: &Mesh, plan: &Arc<Plan>, paths: u32, seed: u64) -> Self {
         let body = &plan.body;
         let (table, area) = (body.table(), body.table().area());
-        let most = area / (2.0_f64.powf(DEPTH + 1.0) * FACETS);
+        let most = area / (2.0_f64.powf(DEPTH + 2.0) * FACETS);
         let bears = |triangle, x| body.union.as_ref().is_none_or(|union| union.bears(triangle, x));
         Self {
             facets: Facets::new(mesh, table.centre(), most, bears),
@@ -134,6 +137,7 @@ impl WalkedBody {
             most: u32::from(!body.model.claims().first_order),
             seed: hash_combine(hash_combine(seed, PURPOSE), body.object().into()),
             plan: plan.clone(),
+            paths,
             windows: OnceLock::new(),
         }
     }
@@ -164,12 +168,14 @@ impl WalkedBody {
         let facets = self.facets.count() as u64 * (size_of::<Facet>() + 8 * size_of::<f32>()) as u64;
         facets
             + u64::from(self.most_patches()) * size_of::<(Patch, Sums)>() as u64
-            + 8 * count * size_of::<Emerged>() as u64
+            + 32 * count * size_of::<Emerged>() as u64
     }
 
-    /// Patches have some facets at the least: log2 of how many that is.
+    /// Log2 of how many patches there may be: each has some facets, and those whose moments are taken together some paths.
     fn finest(&self) -> f64 {
-        (self.facets.count() as f64 / FEWEST).max(1.0).log2()
+        let by_facets = self.facets.largest_in_all() / FEWEST;
+        let by_paths = f64::from(self.paths) / FEWEST * f64::from(1 << AROUND);
+        by_facets.min(by_paths).max(1.0).log2()
     }
 
     /// Finds where paths are to be split, from what `emerged` in a trial, places where light enters with its flux, and what the camera sees.
@@ -184,7 +190,7 @@ impl WalkedBody {
         let object = self.plan.body.object();
         let own: Vec<&SurfacePoint> = visible.iter().filter(|v| v.0 == object).map(|v| &v.1).collect();
         let mut exitance = vec![[0.0_f64; 3]; patches.count()];
-        for e in emerged.iter().filter(|e| e.object == object) {
+        for e in emerged {
             (0..3).for_each(|c| exitance[e.patch as usize][c] += f64::from(e.flux[c]));
         }
         let at = |p: &SurfacePoint| {
@@ -239,7 +245,7 @@ impl WalkedBody {
     ) -> Exitance {
         let mut each = vec![Patch::default(); patches.count()];
         let mut sums = vec![Sums::default(); patches.count()];
-        for e in emerged.iter().filter(|e| e.object == self.plan.body.object()) {
+        for e in emerged {
             let sums = &mut sums[e.patch as usize];
             let c = e.n.dot(e.w);
             let along = (e.w - e.n * c).as_dvec3();

@@ -74,7 +74,13 @@ impl VolumePath {
         let cells = if modelled.iter().flatten().any(|m| m.walked) { CLEARANCE_CELLS } else { 1 };
         let walked = endless(scene, cells, |i| modelled[i].as_ref().is_some_and(|m| m.clear || m.once || m.walked));
         let clear = glass::clear_bodies(scene);
-        let bodies: Vec<Option<Interior>> = walked.into_iter().zip(clear).map(|(body, clear)| clear.or(body)).collect();
+        // A path of many collisions that has come out by a hole would never end.
+        let ends = |(i, body): (usize, Option<Interior>)| {
+            let walked = modelled[i].as_ref().is_some_and(|m| m.walked);
+            body.map(|body| Interior { endless: body.endless && !walked, ..body })
+        };
+        let walked = walked.into_iter().enumerate().map(ends);
+        let bodies: Vec<Option<Interior>> = walked.zip(clear).map(|(body, clear)| clear.or(body)).collect();
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
         Self { throughs, bodies, modelled, bounces, camera_in: glass::camera_in(scene), ..surfaces }
     }

@@ -1,5 +1,5 @@
 //! Weight windows: where paths in a body are split, and where they go on by chance, so that what the camera sees gets as many of them
-//! wherever it is, bright or dark [Wagner, Peplow, Mosher 2014].
+//! wherever it is, bright or dark [WPM14] [VK16].
 
 use super::VolumePath;
 use super::draws::PathSampler;
@@ -59,7 +59,7 @@ impl Windows {
         (at(k, 2) * self.size[1] + at(j, 1)) * self.size[0] + at(i, 0)
     }
 
-    /// What `sums`, of paths from what is seen, tell: smoothed, and as much as `mean` says of the mean over places where light starts.
+    /// What `sums`, of paths from what is seen, tell: smoothed, over their mean.
     pub fn learn(&mut self, sums: &[[f64; 3]]) {
         let [nx, ny, nz] = self.size;
         let smooth = |k: usize, j: usize, i: usize| {
@@ -88,7 +88,7 @@ impl Windows {
             .collect();
     }
 
-    /// Makes a path of weight `mean` at the places that light comes to first worth one.
+    /// Makes all paths worth more by `factor`.
     pub fn scale(&mut self, factor: f32) {
         self.importance.iter_mut().for_each(|i| *i *= factor);
     }
