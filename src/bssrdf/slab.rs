@@ -36,7 +36,7 @@ pub(super) static MODEL: ModelKind = ModelKind {
 ///
 /// All orders of scattering from the first on. \[DJ05\]'s source stands for all light that has entered, what comes through unscattered
 /// included, so that beside this R + T would be more than 1, and T of a thin leaf twice the truth. Here R and T have what is scattered
-/// in the slab: each is \[DJ05\]'s times a share of its own, [`Self::scattered`], see [`Multipole::scattered`].
+/// in the slab: each is \[DJ05\]'s times a share of its own, [`Self::scattered`], see `Multipole::scattered`.
 ///
 /// Both sums are done once, in f64, to all their images (directly near the axis, by their Fourier series in K_0 far
 /// out); what remains per evaluation is one exponential times a tabulated smooth factor, good to 1e-6.
