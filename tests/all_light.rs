@@ -104,8 +104,9 @@ fn a_white_body_in_a_white_well_is_white() {
     let text = camera([0.9, 2.06, 0.9], [0.0, 1.3, 0.0], 40.0, [8, 8]) + &well + &milk + &ball("low", 1.02);
     let water = translucent("water", "sigma_s = [1e-9, 1e-9, 1e-9]\nsigma_a = [1e-6, 1e-6, 1e-6]\ng = 0\neta = 1.3");
     let clear = ball("high", 3.1).replace("milk", "water") + &water;
+    // Ten runs know their noise to a quarter, and it was measured as two thirds of these.
     for (text, most, noise) in
-        [(text.clone(), 0.1, 0.007), (text.clone() + &clear, 0.01, 0.014), (text + &ball("high", 3.1), 0.01, 0.011)]
+        [(text.clone(), 0.1, 0.011), (text.clone() + &clear, 0.01, 0.02), (text + &ball("high", 3.1), 0.01, 0.018)]
     {
         let scene = load(&text);
         let with = |seed| options(Estimator::Cut, 32768, seed);
