@@ -2,6 +2,9 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used)] // a test that cannot run its program has failed
 
+use marmor::Rgb;
+use marmor::bssrdf::Slab;
+use marmor::optics::Medium;
 use std::io::{Read, Write};
 use std::process::{Command, Output, Stdio};
 
@@ -84,6 +87,15 @@ fn column<'a>(table: &'a str, name: &str) -> Vec<&'a str> {
     table.lines().skip(1).map(|row| row.split(',').nth(at).unwrap()).collect()
 }
 
+/// What of the published R and T is scattered in the slab of row `i` of the output `text`.
+fn slab_shares(text: &str, i: usize) -> [f64; 2] {
+    let number = |name: &str| column(text, name)[i].parse::<f64>().unwrap();
+    let splat = |name: &str| Rgb::splat(number(name) as f32);
+    let medium = Medium { sigma_s: splat("sigma_s"), sigma_a: splat("sigma_a"), g: 0.0, eta: number("eta") as f32 };
+    let slab = Slab::between(&medium, number("thickness") as f32, number("eta_far") as f32, true).unwrap();
+    slab.scattered().map(|share| f64::from(share[0]))
+}
+
 /// Rows of high-precision tables through the program: the columns, the unit and the geometry, not only the models.
 #[test]
 fn eval_reproduces_the_reference_rows() {
@@ -118,7 +130,9 @@ fn eval_reproduces_the_reference_rows() {
         for i in 0..results.len() {
             let number = |text: &str| text.parse::<f64>().unwrap();
             let (scattered, absorbed) = (number(s[i]) * (1.0 - number(g[i])), number(a[i]));
-            let (result, exact) = (number(results[i]), number(wanted[i]));
+            // The tables of the slab are of the published formula, whose light is not all scattered in the slab.
+            let share = if table == slab { slab_shares(&text, i)[usize::from(value == "Td")] } else { 1.0 };
+            let (result, exact) = (number(results[i]), number(wanted[i]) * share);
             assert!(result.is_finite());
             // Below, f32 has no digits left.
             if exact.abs() < 1e-30 * (scattered + absorbed).powi(2) {
