@@ -90,7 +90,7 @@ impl Facets {
 }
 
 /// Where a patch is cut in two.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Split {
     axis: u8,
     at: f32,
@@ -118,7 +118,7 @@ impl Patches {
         let axes = turned(seed);
         let keys: Vec<[f32; AXES]> = facets.all.iter().map(|f| key(&axes, facets.normal, f.x, f.n)).collect();
         let mut order: Vec<u32> = (0..keys.len() as u32).collect();
-        let mut splits = vec![Split::default(); (1 << depth) - 1];
+        let mut splits = vec![WHOLE; (1 << depth) - 1];
         let mut ranges: Vec<std::ops::Range<usize>> = std::iter::once(0..order.len()).collect();
         for level in 0..depth {
             let mut next = Vec::with_capacity(2 * ranges.len());
@@ -161,13 +161,7 @@ impl Patches {
     }
 
     /// `count` facets of it, each for the same part of its area, by chance; none of an empty one.
-    pub fn spread<'a>(
-        &self,
-        facets: &'a Facets,
-        patch: usize,
-        count: u32,
-        seed: u64,
-    ) -> impl Iterator<Item = &'a Facet> {
+    pub fn spread<'a>(&self, facets: &'a Facets, patch: usize, count: u32, seed: u64) -> Vec<&'a Facet> {
         let start = if patch == 0 { 0 } else { self.ends[patch - 1] as usize };
         let own = &self.order[start..self.ends[patch] as usize];
         let (mut at, mut passed) = (0, 0.0);
@@ -181,7 +175,7 @@ impl Patches {
             }
             &facets.all[own[at] as usize]
         });
-        pick.collect::<Vec<_>>().into_iter()
+        pick.collect()
     }
 }
 
@@ -298,7 +292,7 @@ mod tests {
                 assert!((area - patches.area(i)).abs() < 1e-9 * mean, "{i}");
                 assert!((0.4 * mean..2.0 * mean).contains(area), "{} of {mean}", area);
             }
-            let spread: Vec<&Facet> = patches.spread(&facets, 7, 5, 1).collect();
+            let spread = patches.spread(&facets, 7, 5, 1);
             assert_eq!(spread.len(), 5);
             assert!(spread.iter().all(|f| patches.at(f.x, f.n) == 7));
         }

@@ -3,8 +3,9 @@
 //! A model of a half space does not know the shape it is used on. What really leaves, and where, is what paths bring that enter with the
 //! light of the cache, are scattered in the body, leave, and enter again. A pass has too few of them for a picture, and enough for the
 //! exitance of patches of the surface. What is finer than a patch the model has: within it the model's own light is scaled, so that the
-//! patch sends out what the paths say. That is linear in the paths, so the mean over passes has the noise of all of them, and the borders of patches
-//! are nowhere in it; how light leans is told by sixteen patches together, where a ratio does no harm. Patches become smaller from pass to pass, and with them what is left of the model's error.
+//! patch sends out what the paths say. That is linear in the paths, so the mean over passes has the noise of all of them, and the borders of
+//! patches are nowhere in it; how light leans is told by sixteen patches together, where a ratio does no harm. Patches become smaller from
+//! pass to pass, and with them what is left of the model's error.
 
 use super::View;
 use super::volume_path::{VolumePath, Windows};
@@ -314,7 +315,7 @@ impl WalkedBody {
                 let (mut points, mut counts) = (Vec::new(), Vec::new());
                 for patch in own {
                     let before = points.len();
-                    for (k, facet) in patches.spread(&self.facets, patch, PLACES, seed).enumerate() {
+                    for (k, facet) in patches.spread(&self.facets, patch, PLACES, seed).into_iter().enumerate() {
                         let stream = PixelStream::new(seed, (patch * PLACES as usize + k) as u64, 0);
                         let exit = Exit { x: facet.x, n: facet.n, w: facet.n };
                         points.push(GatherPoint { exit, place: centre + facet.x.as_dvec3(), stream });

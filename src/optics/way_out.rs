@@ -37,7 +37,7 @@ pub struct Moments {
 }
 
 impl WayOut {
-    /// Of a boundary of relative index `eta` > 0.
+    /// Of a boundary of relative index `eta` = n_inside / n_outside > 0.
     pub fn new(eta: f32) -> Self {
         let rule = GaussLegendre::new(POINTS);
         // Below this cosine light from outside is totally reflected, and beside it T is a root: c = least + (1 - least) s² puts points there.
@@ -58,13 +58,13 @@ impl WayOut {
         }
     }
 
-    /// Radiance under the boundary of exitance `exitance`, in the unit direction `w` outside of normal `n`.
+    /// Radiance under the boundary, the same in all directions, whose exitance is `exitance`; in that one's unit over sr.
     #[inline]
     pub fn even(&self, exitance: Rgb) -> Rgb {
         exitance * self.even
     }
 
-    /// What `moments` add to that in the direction `w`; below zero where more of them leaves to the other side.
+    /// What `moments` add to that in the unit direction `w` outside, `n` being the unit normal; below zero where more of them leaves to the other side.
     #[inline]
     pub fn lean(&self, moments: &Moments, n: Vec3, w: Vec3) -> Rgb {
         let c = n.dot(w).clamp(0.0, 1.0);
