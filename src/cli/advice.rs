@@ -2,11 +2,11 @@
 //! better one, and whether the camera sees anything. `check` says all of it, `render` a line for each body.
 
 use super::setup::{Method, Prepared};
-use marmor::bssrdf::{Unmeasured, measured_albedos};
+use marmor::bssrdf::{ModelName, Unmeasured, measured_albedos};
 use marmor::film::Window;
 use marmor::integrator::{LocalShape, ModelOnBody, TOLERANCE, Trustworthiness, Verdict, View};
 use marmor::render::{Aim, nothing_in_view, shares};
-use marmor::scene::Scene;
+use marmor::scene::{Exitance, Scene, Shape};
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 
@@ -103,9 +103,6 @@ impl<'a> Advice<'a> {
             n => format!("{first:?} and {}", counted(n - 1, "other translucent body", "other translucent bodies")),
         };
         match &self.prepared.method {
-            Method::Subsurface(method) if method.walks() => Some(format!(
-                "{who}: paths walked through it say how much leaves where, the model has what is finer (docs/shape.md)"
-            )),
             Method::Subsurface(_) => None,
             Method::VolumePath(_) => Some(format!("{who}: light is traced through, no model: what is wrong is noise")),
             Method::Direct(_) | Method::Path(_) => {
@@ -122,6 +119,9 @@ impl<'a> Advice<'a> {
 
     /// A body in one line: its model, the expected error of it, and what to type instead.
     pub fn line(&self, t: &Trustworthiness) -> String {
+        if self.walks(t) {
+            return format!("{}: {}", t.object, walked(t));
+        }
         let own = t.own().map_or(String::new(), |own| match own.distribution {
             Some(error) => format!("model {}, expected error {}{}", name(own), percent(error), darker(t)),
             None => format!("model {}, its error is not known: {}", name(own), self.why_unknown(t, own)),
@@ -133,23 +133,50 @@ impl<'a> Advice<'a> {
             choices.extend(self.walk(t));
             choices.extend(trace(t, "right, but slower"));
         }
+        choices.extend(self.not_walked(t).map(|why| format!("paths do not walk through it: {why}")));
         let choices: String = choices.into_iter().map(|choice| format!("; {choice}")).collect();
         format!("{}: {own}{choices}", t.object)
+    }
+
+    /// Whether paths walk through the body.
+    fn walks(&self, t: &Trustworthiness) -> bool {
+        matches!(&self.prepared.method, Method::Subsurface(s) if s.walks(t.index))
+    }
+
+    /// Why they do not, where nobody has asked for that.
+    fn not_walked(&self, t: &Trustworthiness) -> Option<String> {
+        let Method::Subsurface(_) = &self.prepared.method else { return None };
+        let shape = self.prepared.file.method.shape();
+        match self.prepared.scene.exitance(t.index, shape) {
+            Exitance::Model(why) if shape == Shape::Auto && !self.is_named(t) && mend(t).is_none() => Some(why),
+            _ => None,
+        }
+    }
+
+    /// Whether the body's model is asked for by name.
+    fn is_named(&self, t: &Trustworthiness) -> bool {
+        let inside = self.prepared.scene.surface(t.index).inside.as_ref();
+        inside.is_some_and(|inside| inside.model != ModelName::AUTO)
     }
 
     /// That the model need not be all, where paths can walk through the body.
     fn walk(&self, t: &Trustworthiness) -> Option<String> {
         let method = &self.prepared.file.method;
-        let can = matches!(&self.prepared.method, Method::Subsurface(s) if !s.walks())
+        let can = matches!(&self.prepared.method, Method::Subsurface(_))
             && !self.prepared.as_notes
-            && method.bounces != Some(0);
-        let wanted = t.verdict != Verdict::Trust && t.untraceable.is_none();
-        (can && wanted).then(|| "--shape walked: within some percent".into())
+            && method.bounces != Some(0)
+            && self.prepared.scene.not_walkable(t.index).is_empty();
+        (can && t.verdict != Verdict::Trust).then(|| "--shape walked: within some percent".into())
     }
 
     /// A body in some lines, for `check`.
     pub fn paragraph(&self, t: &Trustworthiness) -> Vec<String> {
         let mut lines = vec![format!("{} (material {}):", t.object, t.material)];
+        if self.walks(t) {
+            lines.push(format!("  {}", walked(t)));
+            lines.push("  its model alone, --shape half-space:".into());
+        }
+        lines.extend(self.not_walked(t).map(|why| format!("  paths do not walk through it: {why}")));
         if let (Some(own), true) = (t.own(), mend(t).is_some() || t.verdict == Verdict::NotMeasured) {
             lines.push(format!("  {} (chosen): error not known, of no model: {}", name(own), self.why_unknown(t, own)));
         } else {
@@ -176,6 +203,9 @@ impl<'a> Advice<'a> {
             lines
                 .push(format!("  on {} of its area nothing lies on the other side: the mesh is open", percent(t.open)));
         }
+        if self.walks(t) {
+            return lines;
+        }
         let advice = self.advice(t);
         let so = if advice.is_empty() { vec!["trust the chosen model".into()] } else { advice };
         lines.extend(so.into_iter().map(|line| format!("  -> {line}")));
@@ -187,6 +217,7 @@ impl<'a> Advice<'a> {
         let mut value = json!(t);
         value["sentence"] = self.line(t).into();
         value["take"] = self.take(t).into();
+        value["walked"] = self.walks(t).into();
         value
     }
 
@@ -227,6 +258,9 @@ impl<'a> Advice<'a> {
     /// What to type for the better choice; none where there is none.
     fn take(&self, t: &Trustworthiness) -> Option<String> {
         let traced = t.verdict != Verdict::Trust && t.untraceable.is_none();
+        if self.walks(t) {
+            return None;
+        }
         match t.verdict {
             Verdict::InsideOut | Verdict::Unwelded => Some("--repair".into()),
             Verdict::Open => None,
@@ -292,6 +326,12 @@ impl<'a> Advice<'a> {
         }
         more
     }
+}
+
+/// What is said of a body that paths walk through.
+fn walked(t: &Trustworthiness) -> String {
+    let model = t.own().map_or(String::new(), |own| format!("; {} has what is finer than a patch", name(own)));
+    format!("paths walked through it say how much leaves where{model}: within some percent, what is wrong is noise")
 }
 
 const GIVE_THICKNESS: &str = "give it a thickness: that of the object, or a closed mesh, both faces and the rim";

@@ -65,7 +65,7 @@ pub struct Followed<'a> {
     pub plans: &'a [Option<Arc<Plan>>],
     /// Paths through clear bodies, and of what models lack.
     pub paths: &'a VolumePath,
-    /// Bodies that are walked through; empty where none are.
+    /// Bodies that are walked through, one for each object.
     pub walked: &'a [Option<WalkedBody>],
     /// Their patches.
     pub patches: &'a [Option<Patches>],
@@ -172,7 +172,7 @@ impl Followed<'_> {
             let away = reflect(w, at.n);
             return Some((Ray::new(at.leave(away), away), flux));
         }
-        if !self.walked.is_empty() {
+        if self.walked[plan.body.object() as usize].is_some() {
             return self.walk(arrived, draws, found);
         }
         let walks = self.paths.walks(plan.body.object());

@@ -17,7 +17,7 @@ use crate::math::{hash_combine, unit_f32};
 use crate::optics::{reflect, reflectance, transmittance};
 use crate::query::Ray;
 use crate::sampling::{CacheStream, PixelStream, Points, Turn, cosine_hemisphere};
-use crate::scene::{Object, Scene, Shape};
+use crate::scene::{Object, Scene};
 use crate::tally::{Cause, Tally};
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -53,7 +53,7 @@ pub struct Indirect {
     seed: u64,
     /// For each object, of even passes and of odd ones.
     streams: Vec<[CacheStream; Turn::STREAMS]>,
-    /// Bodies that paths walk through themselves, one for each object; empty where none do.
+    /// Bodies that paths walk through themselves, one for each object.
     pub walked: Vec<Option<WalkedBody>>,
 }
 
@@ -92,13 +92,11 @@ impl Indirect {
         let surfaces = scene.objects.iter().any(reflects) && plans.iter().any(Option::is_some);
         let own = hash_combine(seed, PURPOSE);
         let count = (options.cache_samples / SAMPLES_PER_PATH).max(1);
-        let body = |(object, plan): (&Object, &Option<Arc<Plan>>)| {
-            Some(WalkedBody::new(&object.mesh, plan.as_ref()?, count, seed))
+        let body = |((object, plan), modelled): ((&Object, &Option<Arc<Plan>>), &Option<Modelled>)| {
+            let walked = modelled.as_ref().is_some_and(|m| m.walked);
+            plan.as_ref().filter(|_| walked).map(|plan| WalkedBody::new(&object.mesh, plan, count, seed))
         };
-        let walked = match options.shape {
-            Shape::Walked => scene.objects.iter().zip(plans).map(body).collect(),
-            _ => Vec::new(),
-        };
+        let walked: Vec<Option<WalkedBody>> = scene.objects.iter().zip(plans).zip(&modelled).map(body).collect();
         let streams = |object| Turn::seeds(own).map(|seed| CacheStream::new(Points::Sobol, seed, object));
         Self {
             once: modelled.iter().flatten().any(|m| m.once),
@@ -121,8 +119,7 @@ impl Indirect {
     /// What is said of it.
     pub fn part(&self) -> Part {
         let count = self.count;
-        if !self.walked.is_empty() {
-            let patches = self.walked.iter().flatten().map(WalkedBody::most_patches).max().unwrap_or(0);
+        if let Some(patches) = self.walked.iter().flatten().map(WalkedBody::most_patches).max() {
             return Part::built(
                 OVER,
                 format!(
@@ -132,6 +129,11 @@ impl Indirect {
         }
         let over = if self.surfaces.is_some() { "; as many backwards over opaque surfaces" } else { "" };
         Part::built(OVER, format!("a pass, {count} paths of light from each body and {count} that it mirrors{over}"))
+    }
+
+    /// Whether paths walk through any body themselves.
+    fn walks(&self) -> bool {
+        self.walked.iter().any(Option::is_some)
     }
 
     /// Whether paths are scattered once in bodies whose models lack that.
@@ -160,7 +162,7 @@ impl Indirect {
 
     /// Finds what the camera sees of bodies that paths walk through, and where it comes from.
     pub fn survey(&self, view: View<'_>, lights: &Lights, plans: &[Option<Arc<Plan>>]) {
-        if self.walked.is_empty() {
+        if !self.walks() {
             return;
         }
         let trial = |body: &Option<WalkedBody>| Some(body.as_ref()?.trial());
@@ -210,14 +212,16 @@ impl Indirect {
             round.mirrored(plan, &mut rows, tally);
         }
         keep(caches, &rows, tally);
-        if !self.walked.is_empty() {
-            tally.clock.fill += start.elapsed().as_secs_f64() - (tally.clock.tree - trees);
-            return Walks { patches, emerged: rows.emerged };
-        }
-        // The first round has all light so far, each later one what the one before brought.
-        let mut sources: Vec<Option<Cache>> = caches.to_vec();
+        let mut emerged = rows.emerged;
+        // The first round has all light so far, each later one what the one before brought. What enters bodies that are walked through has
+        // been followed.
+        let by_model = |(cache, body): (&Option<Cache>, &Option<WalkedBody>)| cache.clone().filter(|_| body.is_none());
+        let mut sources: Vec<Option<Cache>> = caches.iter().zip(&self.walked).map(by_model).collect();
         let whole: f64 = sources.iter().flatten().map(flux).sum();
         for level in 1..=self.bounces {
+            if sources.iter().all(Option::is_none) {
+                break;
+            }
             if level > MOST_ROUNDS {
                 for plan in plans.iter().flatten().filter(|p| sources[p.body.object() as usize].is_some()) {
                     tally.walk.walks += 1;
@@ -231,18 +235,17 @@ impl Indirect {
                     round.forwards(plan, source, (whole, level, pass), &mut rows, tally);
                 }
             }
-            if rows.of.iter().all(Vec::is_empty) {
-                break;
-            }
             keep(caches, &rows, tally);
-            let source = |(mut rows, cache): (Vec<CachedSample>, &Option<Cache>)| {
+            emerged.iter_mut().zip(rows.emerged).for_each(|(all, new)| all.extend(new));
+            let source = |(mut rows, (cache, body)): (Vec<CachedSample>, (&Option<Cache>, &Option<WalkedBody>))| {
                 rows.retain(CachedSample::is_finite);
-                cache.as_ref().filter(|_| !rows.is_empty()).map(|_| Cache { lit: rows, attempted: 1 })
+                let cache = cache.as_ref().filter(|_| !rows.is_empty() && body.is_none());
+                cache.map(|_| Cache { lit: rows, attempted: 1 })
             };
-            sources = rows.of.into_iter().zip(caches.iter()).map(source).collect();
+            sources = rows.of.into_iter().zip(caches.iter().zip(&self.walked)).map(source).collect();
         }
         tally.clock.fill += start.elapsed().as_secs_f64() - (tally.clock.tree - trees);
-        Walks::default()
+        Walks { patches, emerged }
     }
 }
 
@@ -308,7 +311,7 @@ impl Round<'_> {
             let flux = light * (PI * weight / self.of.count as f32);
             let arrived = Arrived { plan, at, w, flux };
             // What picked the light must not pick too which part of it goes on.
-            let draws = if self.of.walked.is_empty() { draws } else { draws.fork(2) };
+            let draws = if self.of.walks() { draws.fork(2) } else { draws };
             self.followed.enter(&arrived, depth, draws, found);
         });
     }

@@ -18,9 +18,8 @@ use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{Body, EntrySampling, Object, Obstacle, ObstacleKind, Scene, Shape, View};
+use crate::scene::{Body, EntrySampling, Object, Scene, Shape, View};
 use crate::tally::{Clock, Tally};
-use crate::words::digits;
 use std::sync::{Arc, Once};
 
 /// A cached sample, its columns twice while the tree is built, and its share of the tree.
@@ -37,6 +36,8 @@ pub struct Subsurface {
     albedo: Vec<Rgb>,
     /// One for each object; `None` where it is not translucent or has no area.
     plans: Vec<Option<Arc<Plan>>>,
+    /// One for each object: whether paths walk through it.
+    walked: Vec<bool>,
     /// Light scattered once, where a model leaves it out and no paths go on.
     single: Option<Single>,
     /// Light over other surfaces; `None` where there is none, or it is not asked for.
@@ -62,15 +63,20 @@ impl Subsurface {
         if options.shape == Shape::Walked {
             can_be_walked(scene, &plans, &options)?;
         }
-        let modelled = modelled(&plans, &options);
-        let walks = options.shape == Shape::Walked;
-        let indirect =
-            (walks || goes_on(scene, &modelled, &options)).then(|| Indirect::new(scene, &plans, modelled, &options));
+        let by_walks = |plan: &Option<Arc<Plan>>| {
+            let plan = plan.as_ref().filter(|_| options.bounces > 0);
+            plan.is_some_and(|plan| scene.exitance(plan.body.object(), options.shape).is_by_walks())
+        };
+        let walked: Vec<bool> = plans.iter().map(by_walks).collect();
+        let modelled = modelled(&plans, &walked, &options);
+        let goes_on = walked.contains(&true) || goes_on(scene, &modelled, &options);
+        let indirect = goes_on.then(|| Indirect::new(scene, &plans, modelled, &options));
         Ok(Self {
             options,
             light: DirectLight { lights, samples: options.light_samples },
             albedo: lambertian_albedos(scene)?,
             plans,
+            walked,
             single: if options.single && indirect.is_none() { Single::new(scene, options.seed)? } else { None },
             indirect,
             surveyed: Once::new(),
@@ -80,8 +86,8 @@ impl Subsurface {
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         if let Some(indirect) = &self.indirect {
-            let plans = self.plans.iter().flatten().filter(|_| self.walks());
-            let long = plans.filter_map(|plan| long_walks(scene, plan));
+            let walked = (0..).zip(&self.walked).filter(|(_, walked)| **walked);
+            let long = walked.filter_map(|(object, _)| scene.long_walks(object));
             return indirect.paths.warnings(scene).into_iter().chain(long).collect();
         }
         let black = "`subsurface` without light over other surfaces (`bounces = 0`, `--as-notes`) shows clear bodies black, and lets no \
@@ -89,9 +95,9 @@ impl Subsurface {
         if scene.has_clear_bodies() { vec![black.into()] } else { Vec::new() }
     }
 
-    /// Whether paths walk through bodies, and say how much leaves where.
-    pub fn walks(&self) -> bool {
-        self.options.shape == Shape::Walked
+    /// Whether paths walk through the body of number `object`, and say how much leaves where.
+    pub fn walks(&self, object: u32) -> bool {
+        self.walked[object as usize]
     }
 
     /// Number of bodies with a near field.
@@ -217,52 +223,20 @@ impl Subsurface {
     }
 }
 
-/// That paths can walk through the bodies of `plans`.
+/// That paths can walk through all translucent bodies.
 fn can_be_walked(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Result<()> {
     if options.bounces == 0 {
         let what = "`shape = \"walked\"` is of all the light, and `bounces = 0` of what comes straight from lights";
         return Err(Error::scene(format!("{what}: leave out one of them")));
     }
-    let mut refusals: Vec<String> = scene.obstacles().iter().filter_map(Obstacle::refusal).collect();
-    for plan in plans.iter().flatten() {
-        let index = plan.body.object() as usize;
-        let (object, name) = (&scene.objects[index], &scene.objects[index].name);
-        let with_another = |o: &Obstacle| o.objects.len() > 1 && o.objects.contains(name);
-        if scene.has(object, ObstacleKind::Holes) {
-            refusals.push(format!(
-                "{}: object {name:?} has holes, out of which walks do not come back: close them",
-                object.at
-            ));
-        }
-        if scene.nests().meets[index] && plan.body.union.is_none() || scene.obstacles().iter().any(with_another) {
-            let what = "touches or overlaps another body, and is walked through as if alone: take --method volume_path";
-            refusals.push(format!("{}: object {name:?} {what}", object.at));
-        }
-    }
+    let bodies = plans.iter().flatten().map(|plan| plan.body.object());
+    let mut refusals: Vec<String> = bodies.flat_map(|object| scene.not_walkable(object)).collect();
     if refusals.is_empty() {
         return Ok(());
     }
+    refusals.dedup();
     refusals.push("`shape = \"walked\"` is for bodies that paths can walk through: mend that, or leave it out".into());
     Err(Error::scene(refusals.join("\n")))
-}
-
-/// Collisions of a walk, in the mean, of which a pass takes some seconds or more.
-const LONG: f64 = 3000.0;
-
-/// That walks through a body take long: in a body of volume V and surface S light that enters flies η² 4V/S, whatever its shape, if nothing is absorbed.
-fn long_walks(scene: &Scene, plan: &Plan) -> Option<String> {
-    let object = &scene.objects[plan.body.object() as usize];
-    let sigma_t = f64::from(plan.medium().sigma_t().max());
-    let collisions = 2.0 * f64::from(plan.body.eta).powi(2) * plan.body.body.thickness? * sigma_t;
-    (collisions > LONG).then(|| {
-        format!(
-            "{}: object {:?}: a walk through it has some {} collisions, so that passes take long; to a body so thick a plane is near: \
-             leave out `shape = \"walked\"`",
-            object.at,
-            object.name,
-            digits(collisions, 2)
-        )
-    })
 }
 
 /// The light of a pass.
@@ -273,18 +247,17 @@ pub struct Lit {
 }
 
 /// How paths meet each body.
-fn modelled(plans: &[Option<Arc<Plan>>], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
-    let of = |plan: &Option<Arc<Plan>>| {
+fn modelled(plans: &[Option<Arc<Plan>>], walked: &[bool], options: &SubsurfaceOptions) -> Vec<Option<Modelled>> {
+    let of = |(plan, &walked): (&Option<Arc<Plan>>, &bool)| {
         let plan = plan.as_ref()?;
         let once = options.single && !plan.body.model.claims().first_order;
-        let walked = options.shape == Shape::Walked;
         // Patches have no light that comes straight through, not even through what is thin of a thick body.
         let clear = walked || lets_light_through(&plan.body.body, plan.medium());
         // What comes over other surfaces is in what the paths bring.
         let near = plan.near.as_ref().filter(|_| !walked).map(|_| plan.clone());
         Some(Modelled { eta: plan.body.eta, clear, once, near, walked })
     };
-    plans.iter().map(of).collect()
+    plans.iter().zip(walked).map(of).collect()
 }
 
 /// Optical thickness of bodies beyond which no light is taken to come through straight: less than exp(-14), a millionth.
@@ -336,9 +309,10 @@ impl Integrator for Subsurface {
                 if let Some(indirect) = &self.indirect {
                     indirect.survey(view, lights, &self.plans);
                 }
-                if self.indirect.is_some() && self.options.shape == Shape::HalfSpace {
+                if self.indirect.is_some() {
                     let seed = self.options.seed;
-                    for plan in self.plans.iter().flatten() {
+                    let by_model = self.plans.iter().zip(&self.walked).filter(|(_, walked)| !**walked);
+                    for plan in by_model.filter_map(|(plan, _)| plan.as_ref()) {
                         let clear = lets_light_through(&plan.body.body, plan.medium());
                         plan.balanced_by(|| balance(plan, view, clear, seed));
                     }

@@ -64,7 +64,7 @@ impl Method {
                     specular: options.specular.unwrap_or(start.specular),
                     single: options.single.unwrap_or(start.single),
                     light_samples,
-                    shape: options.shape.filter(|_| !as_notes).unwrap_or(start.shape),
+                    shape: if as_notes { start.shape } else { options.shape() },
                     bounces: if as_notes { 0 } else { options.bounces.unwrap_or(start.bounces) },
                     seed,
                     ..start

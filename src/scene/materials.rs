@@ -109,7 +109,7 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
     let positive = |n: &Node| n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0);
     let translucent = Translucent {
         medium,
-        model: named_value(m, "model")?.unwrap_or(ModelName::STANDARD),
+        model: named_value(m, "model")?.unwrap_or(ModelName::AUTO),
         thickness: m.get("thickness", "a number of units above 0", positive)?.map(|v| v as f32),
         calibrated: switch(m, "calibrated")?.unwrap_or(false),
         exit_normalisation: switch(m, "exit_normalisation")?.unwrap_or(true),

@@ -24,6 +24,7 @@ mod tree;
 mod untraceable;
 mod values;
 mod view;
+mod walkable;
 mod warnings;
 mod world;
 
@@ -34,6 +35,7 @@ pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread};
+pub use walkable::Exitance;
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
 
 // For what is above this room.

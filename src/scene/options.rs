@@ -123,6 +123,8 @@ named! {
 named! {
     /// What decides how much light leaves a body where.
     Shape, "shape",
+    /// Paths, where they can walk through a body and its material names no model; else the model alone.
+    Auto = "auto",
     /// The model alone, as on a plane.
     HalfSpace = "half-space",
     /// Paths walked through the body itself, patch by patch; the model has what is finer than a patch.
@@ -164,6 +166,14 @@ pub struct MethodOptions {
     pub photons: Option<u32>,
     /// Subsurface and volume path: add the mirror reflection at the boundary.
     pub specular: Option<bool>,
+}
+
+impl MethodOptions {
+    /// What decides how much light leaves where: what is asked for by name is taken as it is, an estimator or the lecture's entry too.
+    pub fn shape(&self) -> Shape {
+        let named = self.estimator.is_some() || self.entry == Some(EntrySampling::Cosine) || self.bounces == Some(0);
+        self.shape.unwrap_or(if named { Shape::HalfSpace } else { Shape::Auto })
+    }
 }
 
 /// `[render]`: how long and how shown.

@@ -1,7 +1,7 @@
 //! Oddities that can be rendered but that a user should hear of, each with its numbers.
 
 use super::file::SceneFile;
-use super::options::{MethodName, Shape};
+use super::options::MethodName;
 use super::{ObstacleKind, Scene, Translucent, energy};
 use crate::geometry::Solid;
 use crate::optics::{ChannelOptics, Trust};
@@ -35,7 +35,9 @@ fn materials(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             let first = if file.method.single == Some(false) { no_first_order(t) } else { None };
             if models_are_used(file) {
                 // Paths that walk through a body do so in any medium.
-                let outside = if model_decides(file) { outside_diffusion(t) } else { None };
+                let mut own = (0..).zip(&scene.objects).filter(|(_, o)| scene.materials[o.material].name == entry.name);
+                let by_model = own.any(|(object, _)| model_decides(file, scene, object));
+                let outside = if by_model { outside_diffusion(t) } else { None };
                 let all = nothing_there(t).into_iter().chain(outside).chain(first);
                 said.extend(all.map(|what| format!("{head}: {what}")));
             }
@@ -58,9 +60,9 @@ fn models_are_used(file: &SceneFile) -> bool {
     file.method.name.is_none_or(|name| name == MethodName::Subsurface)
 }
 
-/// Whether it alone says how much light leaves.
-fn model_decides(file: &SceneFile) -> bool {
-    models_are_used(file) && file.method.shape != Some(Shape::Walked)
+/// Whether it alone says how much light leaves the object.
+fn model_decides(file: &SceneFile, scene: &Scene, object: u32) -> bool {
+    models_are_used(file) && !scene.exitance(object, file.method.shape()).is_by_walks()
 }
 
 /// Channels of a medium that is none: models have no light there, `volume_path` has clear glass.
@@ -113,7 +115,7 @@ fn objects(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
             // Of a body that light hardly meets no model need be spoken.
             if let Some(what) = thin(t, bounds.extent().length()) {
                 said.push(format!("{head}: {what}"));
-            } else if model_decides(file) && !scene.has(object, ObstacleKind::Sheet) {
+            } else if model_decides(file, scene, index) && !scene.has(object, ObstacleKind::Sheet) {
                 let material = &scene.materials[object.material].name;
                 let found = energy::of(t, (scene.body(index).and_then(|b| b.shape()), object.sheet.is_some()), &|| {
                     scene.untraceable(index)

@@ -1,0 +1,94 @@
+//! Which bodies paths walk through beside their model, and why not the others.
+
+use super::options::Shape;
+use super::{Obstacle, ObstacleKind, Scene};
+use crate::bssrdf::ModelName;
+use crate::words::digits;
+
+/// Collisions of a walk, in the mean, from which a pass takes some seconds or more.
+const LONG: f64 = 3000.0;
+
+/// What decides how much light leaves a body where.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Exitance {
+    /// Its model alone, and why.
+    Model(String),
+    /// Paths that walk through it; the model has what is finer than a patch of its surface.
+    Walks,
+}
+
+impl Exitance {
+    /// Whether paths do.
+    pub fn is_by_walks(&self) -> bool {
+        *self == Self::Walks
+    }
+}
+
+impl Scene {
+    /// What decides how much light leaves the translucent object of number `object` under `shape`.
+    pub fn exitance(&self, object: u32, shape: Shape) -> Exitance {
+        let model = |why: String| Exitance::Model(why);
+        let Some(t) = &self.surface(object).inside else { return model("not translucent".into()) };
+        match shape {
+            Shape::HalfSpace => return model("as asked for".into()),
+            Shape::Walked => return Exitance::Walks,
+            Shape::Auto => {}
+        }
+        if t.model != ModelName::AUTO {
+            return model(format!("model `{}` is asked for by name", t.model.name()));
+        }
+        let barred = self.not_walkable(object).into_iter().next();
+        let long = || {
+            let collisions = self.collisions(object).filter(|c| *c > LONG)?;
+            let walk = digits(collisions, 2);
+            Some(format!("a walk through it has some {walk} collisions: to a body so thick a plane is near"))
+        };
+        barred.or_else(long).map_or(Exitance::Walks, model)
+    }
+
+    /// What keeps paths from walking through the object of number `object`, beside its model; empty where nothing does.
+    pub fn not_walkable(&self, object: u32) -> Vec<String> {
+        let own = &self.objects[object as usize];
+        let mut why = Vec::new();
+        let of_it = |o: &&Obstacle| o.objects.contains(&own.name);
+        why.extend(self.obstacles().iter().filter(of_it).filter_map(Obstacle::refusal));
+        let head = format!("{}: object {:?}", own.at, own.name);
+        if why.is_empty() && own.findings.inside_out() {
+            why.push(format!("{head} has faces that look inwards: --repair turns them"));
+        }
+        if self.has(own, ObstacleKind::Holes) {
+            why.push(format!("{head} has holes, out of which walks do not come back: close them"));
+        }
+        let with_another = self.obstacles().iter().filter(of_it).any(|o| o.objects.len() > 1);
+        if self.nests().meets[object as usize] && self.union(object).is_none() || with_another {
+            why.push(format!(
+                "{head} touches or overlaps another body, and is walked through as if alone: take --method volume_path"
+            ));
+        }
+        if self.camera_in().iter().any(|c| c.0 == object) {
+            why.push(format!("{head} has the camera in it: take --method volume_path"));
+        }
+        why
+    }
+
+    /// How often a walk through the object of number `object` is scattered in the mean, in the densest channel: in a body of volume V and
+    /// surface S light that enters flies η² 4V/S, whatever its shape, if nothing is absorbed.
+    fn collisions(&self, object: u32) -> Option<f64> {
+        let t = self.surface(object).inside.as_ref()?;
+        let thickness = self.body(object)?.thickness?;
+        Some(2.0 * f64::from(t.medium.eta).powi(2) * thickness * f64::from(t.medium.sigma_t().max()))
+    }
+
+    /// That walks through the object of number `object` take long.
+    pub fn long_walks(&self, object: u32) -> Option<String> {
+        let collisions = self.collisions(object).filter(|c| *c > LONG)?;
+        let own = &self.objects[object as usize];
+        Some(format!(
+            "{}: object {:?}: a walk through it has some {} collisions, so that passes take long; to a body so thick a plane is near: \
+             leave out `shape = \"walked\"`",
+            own.at,
+            own.name,
+            digits(collisions, 2)
+        ))
+    }
+}
