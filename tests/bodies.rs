@@ -64,7 +64,8 @@ fn cube(x: f64, half: f64, n: u32) -> ObjMesh {
 }
 
 /// Of milky stuff: light goes as far as the bodies are large, but not through them.
-const MILK: &str = "[material.milk]\ntype = \"translucent\"\nsigma_s_prime = 5\nsigma_a = 0.03\neta = 1.3\n";
+const MILK: &str =
+    "[material.milk]\ntype = \"translucent\"\nsigma_s_prime = 5\nsigma_a = 0.03\neta = 1.3\nmodel = \"standard\"\n";
 /// A lamp above alone, so that what is below glows by what comes from above.
 const LAMP: &str = "[[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre = [0.3, 4, 0.5]\nedge_u = [1.5, 0, 0]\nedge_v = [0, 0, 1.5]\n\
                     material = \"lamp\"\n[material.lamp]\ntype = \"emissive\"\nradiance = 10\ntwo_sided = true\n";
@@ -127,7 +128,8 @@ fn straight() -> SubsurfaceOptions {
 const CLOSE: Within = Within { errors: 8.0, noise: 0.01 };
 
 fn lit(more: &str) -> String {
-    format!("{BELOW}{LAMP}{MILK}{more}")
+    let milk = if more.contains("model =") { MILK.replace("model = \"standard\"\n", "") } else { MILK.into() };
+    format!("{BELOW}{LAMP}{milk}{more}")
 }
 
 /// Sets of parts, and the one mesh that they are together.

@@ -25,6 +25,7 @@ type = "translucent"
 sigma_s_prime = 1.998
 sigma_a = 0.002
 eta = 1.3
+model = "standard"
 [method]
 cache_samples = 100
 [render]
@@ -148,7 +149,7 @@ fn every_remedy_does_what_it_says() {
 
 #[test]
 fn words_fit_scenes_of_several_materials_and_scenes_that_name_a_model() {
-    let other = "[material.\"my wax\"]\ntype = \"translucent\"\npreset = \"marble\"\n";
+    let other = "[material.\"my wax\"]\ntype = \"translucent\"\npreset = \"marble\"\nmodel = \"standard\"\n";
     let objects = ball("one", -2.5, 2.0, "wax", "") + &ball("two", 2.5, 2.0, "my wax", "") + other;
     let folder = command::folder(&scene(&objects));
     let told = line(folder.path(), "two", "");
@@ -162,6 +163,26 @@ fn words_fit_scenes_of_several_materials_and_scenes_that_name_a_model() {
     let told = line(folder.path(), "two", "");
     assert!(told.contains("model `better`") && told.contains("; --model beam: "), "{told}");
     assert!(line(folder.path(), "two", "--model beam").contains("model `beam`"));
+}
+
+/// A body whose model is not named is walked through, and that is said; one that paths cannot walk through says why, and keeps its model.
+#[test]
+fn a_body_without_a_model_is_walked_through_where_that_can_be() {
+    let unnamed = |text: &str| scene(text).replace("model = \"standard\"\n", "");
+    let folder = command::folder(&unnamed(&ball("one", 0.0, 2.0, "wax", "")));
+    let told = said(folder.path(), "render scene.toml -o x.exr --spp 1");
+    assert!(told.contains("one: paths walked through it say how much leaves where, `beam` what is finer"), "{told}");
+    let named = said(folder.path(), "render scene.toml -o x.exr --spp 1 --model beam");
+    assert!(named.contains("one: model `beam`, expected error") && !named.contains("walked"), "{named}");
+    let touching =
+        ball("one", -1.0, 2.0, "wax", "") + &ball("two", 1.5, 2.0, "wax", "") + &ball("apart", 9.0, 2.0, "wax", "");
+    fs::write(folder.path().join("scene.toml"), unnamed(&touching)).unwrap();
+    let checked = said(folder.path(), "check scene.toml");
+    assert_eq!(checked.matches("paths do not walk through it: ").count(), 2, "{checked}");
+    assert_eq!(checked.matches("paths walked through it").count(), 1, "{checked}");
+    for shape in ["half-space", "auto"] {
+        said(folder.path(), &format!("render scene.toml -o {shape}.exr --spp 2 --shape {shape}"));
+    }
 }
 
 #[test]

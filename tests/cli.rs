@@ -115,8 +115,18 @@ fn a_reference_gives_figures_that_fall() {
 fn the_lecture_to_the_letter_has_the_same_mean_as_the_same_model_here() {
     let folder = folder();
     let mean = |image: &Image| image.pixels.iter().map(|p| f64::from(p[0])).sum::<f64>();
-    let plain: Vec<&str> =
-        vec!["-D", "method.specular=false", "-D", "method.cache_samples=4000", "-D", "method.bounces=0", "--spp", "16"];
+    let plain: Vec<&str> = vec![
+        "-D",
+        "material.wax.model=standard",
+        "-D",
+        "method.specular=false",
+        "-D",
+        "method.cache_samples=4000",
+        "-D",
+        "method.bounces=0",
+        "--spp",
+        "16",
+    ];
     let run = |name: &str, seed: u32, more: &[&str]| {
         let seed = seed.to_string();
         let arguments: Vec<&str> = plain.iter().chain(more).chain(&["--seed", &seed]).copied().collect();

@@ -83,7 +83,7 @@ fn background_does_not_dilute_what_an_object_is_wrong_by() {
     run(&[&render[..], &["truth.exr", "--model", "standard"]].concat());
     for reference in ["truth.film", "truth.exr"] {
         let compare =
-            ["compare", "scene.toml", "--models", "standard", "--reference", reference, "--time-budget", "600ms"];
+            ["compare", "scene.toml", "--models", "standard", "--reference", reference, "--time-budget", "2s"];
         let told = run(&[&compare[..], &dark[..2], &["-o", "out"]].concat());
         let csv = fs::read_to_string(folder.path().join("out/compare.csv")).unwrap();
         let ratio = |part: &str| cell(&csv, "standard", part, "mean_ratio");

@@ -86,6 +86,8 @@ fn glow(method: &str) -> (bool, String) {
         "shape = \"rectangle\"\ncentre = [0, 5, 0]\nedge_u = [2, 0, 0]\nedge_v = [0, 0, 2]",
         "shape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 0.3\nrings = 8\nsegments = 16",
     );
+    // A model without the first order would have that by paths, which meet the lamp.
+    let scene = scene.replace("eta = 1.3", "eta = 1.3\nmodel = \"standard\"");
     let folder = folder(&scene);
     let call = marmor(folder.path(), &["render", "scene.toml", "--method", method, "--spp", "16", "-o", "a.exr"]);
     let said = text(&call.stderr);

@@ -197,7 +197,11 @@ fn oddities_are_warned_of_with_their_numbers() {
     for (typed, odd, fragments) in [
         ("unit = \"mm\"", "", &["no `unit`", "millimetres are assumed"][..]),
         ("sigma_s_prime = [2, 3, 4]", "sigma_s_prime = [2, 3, 0.1]", &["mean free path in blue, 9.091 units", "3.46"]),
-        ("sigma_a = 0.01", "sigma_a = [0.01, 4, 0.01]", &["reduced albedo 0.4286 in green", "outside diffusion"]),
+        (
+            "sigma_a = 0.01",
+            "sigma_a = [0.01, 4, 0.01]\nmodel = \"standard\"",
+            &["reduced albedo 0.4286 in green", "outside diffusion"],
+        ),
         ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "sigma_s_prime = [2, 3, 0]\nsigma_a = [1, 1, 0]", &["in blue"]),
         ("radiance = 5", "radiance = 0", &["no light"]),
         ("edge_u = [1, 0, 0]", "edge_u = [0, 0, 0]", &["all 2 triangles have no area", "no light"]),

@@ -95,7 +95,7 @@ fn a_sheet_in_pieces_is_unwelded_and_open() {
 /// Models are not spoken of where none is used, nor where light hardly meets the body.
 #[test]
 fn what_no_one_can_act_on_is_not_said() {
-    let dark = "sigma_s_prime = 1\nsigma_a = 30";
+    let dark = "sigma_s_prime = 1\nsigma_a = 30\nmodel = \"standard\"";
     let whole = cube(1.0, &triangles(), "");
     assert!(load(&whole, "", dark, "subsurface").warnings.join("").contains("every BSSRDF model errs"));
     assert_eq!(load(&whole, "", dark, "volume_path").warnings, Vec::<String>::new());
@@ -112,7 +112,8 @@ fn what_no_one_can_act_on_is_not_said() {
 #[test]
 fn thin_bodies_have_their_thickness_said() {
     for (h, words) in [(1e-3, "0.002 units thick, 0.004"), (1e-5, "2e-5 units thick, 4.04e-5 transport")] {
-        let said = load(&cube(h, &triangles(), ""), "", "sigma_s_prime = 2\nsigma_a = 0.02", "subsurface").warnings;
+        let medium = "sigma_s_prime = 2\nsigma_a = 0.02\nmodel = \"standard\"";
+        let said = load(&cube(h, &triangles(), ""), "", medium, "subsurface").warnings;
         assert!(said.len() == 1 && said[0].contains(words), "{said:#?}");
     }
 }

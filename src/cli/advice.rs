@@ -330,8 +330,8 @@ impl<'a> Advice<'a> {
 
 /// What is said of a body that paths walk through.
 fn walked(t: &Trustworthiness) -> String {
-    let model = t.own().map_or(String::new(), |own| format!("; {} has what is finer than a patch", name(own)));
-    format!("paths walked through it say how much leaves where{model}: within some percent, what is wrong is noise")
+    let model = t.own().map_or(String::new(), |own| format!(", {} what is finer than a patch", name(own)));
+    format!("paths walked through it say how much leaves where{model}: within some percent and noise")
 }
 
 const GIVE_THICKNESS: &str = "give it a thickness: that of the object, or a closed mesh, both faces and the rim";

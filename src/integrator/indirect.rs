@@ -141,11 +141,20 @@ impl Indirect {
         self.once
     }
 
-    /// Memory beside that of `samples` cached samples of `bodies` bodies [bytes], where half of the paths arrive.
-    pub fn bytes(&self, bodies: u64, samples: u64) -> u64 {
-        let paths = bodies * u64::from(self.count) * if self.surfaces.is_some() { 3 } else { 2 };
-        let walked: u64 = self.walked.iter().flatten().map(|body| body.bytes(u64::from(self.count))).sum();
-        (samples + paths / 2) * size_of::<CachedSample>() as u64 + walked
+    /// Memory beside that of the caches, of so many samples for each object, where half of the paths arrive; for a picture of so many pixels
+    /// [bytes].
+    pub fn bytes(&self, samples: &[u64], pixels: f64) -> u64 {
+        let kinds = if self.surfaces.is_some() { 3 } else { 2 };
+        let of = |(samples, body): (&u64, &Option<WalkedBody>)| {
+            if *samples == 0 {
+                return 0;
+            }
+            // What bodies send on by their models is gathered from a copy of the cache.
+            let twice = if body.is_some() { 0 } else { *samples };
+            let rows = (twice + kinds * u64::from(self.count) / 2) * size_of::<CachedSample>() as u64;
+            rows + body.as_ref().map_or(0, |body| body.bytes(pixels))
+        };
+        samples.iter().zip(&self.walked).map(of).sum()
     }
 
     fn round<'a>(

@@ -100,6 +100,11 @@ impl Subsurface {
         self.walked[object as usize]
     }
 
+    /// Whether paths walk through any body.
+    pub fn walks_any(&self) -> bool {
+        self.walked.contains(&true)
+    }
+
     /// Number of bodies with a near field.
     pub fn near_fields(&self) -> usize {
         self.plans.iter().flatten().filter(|plan| plan.near.is_some()).count()
@@ -358,12 +363,12 @@ impl Integrator for Subsurface {
         self.options.splits()
     }
 
-    fn pass_bytes(&self, _view: View<'_>) -> u64 {
-        let plans = self.plans.iter().flatten();
-        let samples: u64 = plans.clone().map(|plan| u64::from(plan.samples)).sum();
-        // While light over other surfaces is found, the cache is there twice.
-        let twice = self.indirect.as_ref().map_or(0, |indirect| indirect.bytes(plans.count() as u64, samples));
-        samples * TAKEN_PER_SAMPLE + twice
+    fn pass_bytes(&self, view: View<'_>) -> u64 {
+        let samples = |plan: &Option<Arc<Plan>>| plan.as_ref().map_or(0, |plan| u64::from(plan.samples));
+        let samples: Vec<u64> = self.plans.iter().map(samples).collect();
+        let [width, height] = view.scene.camera.resolution.map(f64::from);
+        let more = self.indirect.as_ref().map_or(0, |indirect| indirect.bytes(&samples, width * height));
+        samples.iter().sum::<u64>() * TAKEN_PER_SAMPLE + more
     }
 
     fn lights(&self, scene: &Scene) -> KnownLights {

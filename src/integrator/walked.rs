@@ -52,6 +52,11 @@ const DARK: f64 = 0.02;
 /// Rays across and down the picture that tell what is seen, at most.
 const CELLS: u32 = 64;
 
+/// Parts of a path in the mean, for a picture of so many pixels.
+fn parts(pixels: f64) -> f64 {
+    (PARTS.0 * (pixels / PARTS.1).sqrt()).clamp(PARTS_BOUNDS[0], PARTS_BOUNDS[1])
+}
+
 /// Points of objects that the camera sees from outside.
 pub fn visible(view: View<'_>) -> Vec<(u32, SurfacePoint)> {
     let camera = &view.scene.camera;
@@ -164,12 +169,12 @@ impl WalkedBody {
         2_f64.powf(self.finest().min(DEEPEST)) as u32
     }
 
-    /// Memory of facets and patches, and of what `count` paths bring [bytes].
-    pub fn bytes(&self, count: u64) -> u64 {
-        let facets = self.facets.count() as u64 * (size_of::<Facet>() + 8 * size_of::<f32>()) as u64;
-        facets
-            + u64::from(self.most_patches()) * size_of::<(Patch, Sums)>() as u64
-            + 32 * count * size_of::<Emerged>() as u64
+    /// Memory of facets and patches, and of what the paths of a pass bring in a picture of so many pixels [bytes].
+    pub fn bytes(&self, pixels: f64) -> u64 {
+        // Lists grow by doubling; each part of a path comes out twice, and is there twice while tasks are collected.
+        let facets = self.facets.count() as u64 * (2 * size_of::<Facet>() + 8 * size_of::<f32>()) as u64;
+        let emerged = 4.0 * parts(pixels) * f64::from(self.paths) * size_of::<Emerged>() as f64;
+        facets + u64::from(self.most_patches()) * size_of::<(Patch, Sums)>() as u64 + emerged as u64
     }
 
     /// Log2 of how many patches there may be: each has some facets, and those whose moments are taken together some paths.
@@ -211,8 +216,7 @@ impl WalkedBody {
             let worth = |(x, flux): &(DVec3, Rgb)| f64::from(windows.worth(*x, *flux));
             let mean = entering.iter().map(worth).sum::<f64>() / entering.len() as f64;
             let [width, height] = view.scene.camera.resolution.map(f64::from);
-            let parts = PARTS.0 * (width * height / PARTS.1).sqrt();
-            let factor = (parts.clamp(PARTS_BOUNDS[0], PARTS_BOUNDS[1]) / mean) as f32;
+            let factor = (parts(width * height) / mean) as f32;
             (factor.is_finite() && factor > 0.0).then(|| windows.scale(factor))?;
             Some(windows)
         };

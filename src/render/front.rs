@@ -198,8 +198,19 @@ impl Prepared {
         vec![
             ("model", self.models(|name, t| format!("{name}: {}", t.model_text()))),
             ("estimator", self.estimator.name().into()),
+            ("exitance", self.exitance()),
             ("asNotes", self.as_notes.to_string()),
         ]
+    }
+
+    /// What decides how much light leaves each translucent object.
+    fn exitance(&self) -> String {
+        let Method::Subsurface(method) = &self.method else { return String::new() };
+        let of = |(i, o): (u32, &Object)| {
+            let how = if method.walks(i) { "walks" } else { "model" };
+            self.scene.surface(i).is_translucent().then(|| format!("{}: {how}", o.name))
+        };
+        (0..).zip(&self.scene.objects).filter_map(of).collect::<Vec<_>>().join(", ")
     }
 
     /// Of each translucent material what `text` makes of its name and medium.

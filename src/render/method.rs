@@ -99,6 +99,7 @@ impl Method {
     pub fn bytes_per_triangle(&self) -> u64 {
         match self {
             Self::AmbientOcclusion(_) | Self::Direct(_) | Self::Path(_) => 0,
+            Self::Subsurface(subsurface) if subsurface.walks_any() => 160,
             Self::Subsurface(_) => 40,
             Self::VolumePath(_) => 90,
         }

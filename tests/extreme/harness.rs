@@ -9,7 +9,7 @@ use marmor::integrator::{
     AmbientOcclusion, Direct, Integrator, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions,
 };
 use marmor::query::Backend;
-use marmor::scene::{Estimator, Orders, Scene, SceneFile};
+use marmor::scene::{Estimator, Orders, Scene, SceneFile, Shape};
 use marmor::tally::Tally;
 use std::path::Path;
 
@@ -83,7 +83,10 @@ pub fn load_with(text: &str, files: &[(&str, &str)], repair: bool) -> marmor::Re
     for (name, content) in files {
         std::fs::write(folder.path().join(name), content).unwrap();
     }
-    Scene::load_with(&SceneFile::parse(text, &folder.path().join("scene.toml"))?, repair)
+    let file = SceneFile::parse(text, &folder.path().join("scene.toml"))?;
+    // What is told of a model is told of that model.
+    let file = if text.contains("model =") { file } else { file.with(&["method.model=standard"])? };
+    Scene::load_with(&file, repair)
 }
 
 pub fn load(text: &str) -> marmor::Result<Scene> {
@@ -140,6 +143,10 @@ pub fn shots(scene: &Scene) -> Vec<Shot> {
         {
             all.push(subsurface_shot(scene, estimator, samples, backend));
         }
+        if can_be_walked(scene) {
+            let walked = SubsurfaceOptions { shape: Shape::Walked, ..subsurface(Estimator::Cut, 2000) };
+            all.push(shot(&Subsurface::new(scene, walked).unwrap(), scene, backend, "subsurface, walked".into()));
+        }
         // Media in one another have no paths.
         let traced = VolumePathOptions { orders: Orders::All, photons: 50, specular: true, seed: 1 };
         if let Ok(method) = VolumePath::new(scene, traced) {
@@ -147,6 +154,12 @@ pub fn shots(scene: &Scene) -> Vec<Shot> {
         }
     }
     all
+}
+
+/// Whether paths walk through all bodies, and come out in less than a day.
+fn can_be_walked(scene: &Scene) -> bool {
+    let bodies = (0..scene.objects.len() as u32).filter(|o| scene.surface(*o).is_translucent());
+    bodies.into_iter().all(|o| scene.not_walkable(o).is_empty() && scene.long_walks(o).is_none())
 }
 
 pub fn subsurface_shot(scene: &Scene, estimator: Estimator, samples: u32, backend: Backend) -> Shot {

@@ -32,9 +32,10 @@ pub fn mesh(name: &str, file: &str, material: &str) -> String {
     format!("[[object]]\nname = \"{name}\"\nmesh = \"{file}\"\nmaterial = \"{material}\"\n")
 }
 
-/// A material whose keys are `medium`.
+/// A material whose keys are `medium`. Of the model `standard`, unless `medium` names one: what is told of a model is told of that model.
 pub fn translucent(name: &str, medium: &str) -> String {
-    format!("[material.{name}]\ntype = \"translucent\"\n{medium}\n")
+    let model = if medium.contains("model =") { "" } else { "model = \"standard\"\n" };
+    format!("[material.{name}]\ntype = \"translucent\"\n{model}{medium}\n")
 }
 
 /// Of one albedo, or of three.
