@@ -15,10 +15,18 @@
 //! apart do not go together, this has as many degrees of freedom as there are blocks that count. How far is far differs,
 //! so blocks of up to three sizes are tried.
 //!
-//! w has to come from x too, and x is noisy: dark pixels that happen to be darker count too much, pixels that have met little
-//! light and much at a time too little. Half of each pixel's noise, taken off the square of its level, changes S by a factor e^c.
-//! The error of S by its weights is of that size, of either sign, and no spread tells of it: it widens the interval, and where it
-//! is large there is none. docs/convergence.md has what that covers.
+//! w = 1 / (l^2 + 0.01 mean(l)^2) needs the level l of each pixel, and x will not do: a firefly would raise the level that its
+//! own error is divided by, and hide itself. So x is shrunk towards m, the mean of x over the pixels around, which has nothing of
+//! the pixel's own samples:
+//!
+//!   l = (x M^2 + m V^2) / (M^2 + V^2), but no farther than from e to o,   V = (e - o)^2 n_e n_o / (n_e + n_o)^2,
+//!
+//! with M the variance of x among the pixels around, times 1 + 1 / their number. A firefly has a large V and is in one half alone:
+//! l is at the other half, where the pixel was before. Next to one, and at edges, M is large: l is x.
+//!
+//! What is left of a pixel's noise in its level is told by half of it, taken off the square of the level: that changes S by a
+//! factor e^c. The error of S by its weights is of that size, of either sign, and no spread tells of it: it widens the interval,
+//! and where it is large there is none. docs/convergence.md has what that covers.
 
 use super::metrics::{BLOCK, Estimate, student_975};
 use super::{Film, Window};
@@ -30,10 +38,11 @@ use serde::Serialize;
 pub struct SelfErrors {
     /// sqrt(mean((x - limit)^2)), in the unit of the picture.
     pub rmse: Estimate,
-    /// mean((x - limit)^2 / (limit^2 + 0.01 mean(limit)^2)); none where the picture is black.
+    /// mean((x - limit)^2 / (limit^2 + 0.01 mean(limit)^2)), with levels for the limit that a pixel's own bright samples do not
+    /// raise; none where the picture is black.
     pub relmse: Option<Estimate>,
     /// The same, with more weight for a pixel that has met little light and much at a time: for ending a render. `relmse`
-    /// is too small where many pixels are like that, this is a little too large where few are.
+    /// may be too small where many pixels are like that, this is a little too large where few are.
     pub relmse_careful: Option<f64>,
     /// The pixel that carries most of the noise, where a speck of one half does not count for the level of its pixel; none
     /// without noise.
@@ -131,8 +140,39 @@ impl State {
     }
 
     fn mean(&self, i: usize, c: usize) -> f64 {
-        let n = self.passes.map(f64::from);
-        (n[0] * self.half(0, i, c) + n[1] * self.half(1, i, c)) / (n[0] + n[1])
+        (f64::from(self.sums[0][i][c]) + f64::from(self.sums[1][i][c])) / f64::from(self.total())
+    }
+
+    /// Level of pixel i, see the head of this file.
+    fn level(&self, window: Window, i: usize) -> [f64; 3] {
+        let (width, height) = (window.width(), window.height());
+        let near = |at: usize, end: usize| at.saturating_sub(1)..(at + 2).min(end);
+        let (mut sums, mut squares, mut n) = ([0.0; 3], [0.0; 3], 0.0);
+        for row in near(i / width, height) {
+            for column in near(i % width, width) {
+                let k = row * width + column;
+                if k != i {
+                    n += 1.0;
+                    for c in 0..3 {
+                        let mean = self.mean(k, c);
+                        sums[c] += mean;
+                        squares[c] += mean * mean;
+                    }
+                }
+            }
+        }
+        std::array::from_fn(|c| {
+            let (own, [e, o]) = (self.mean(i, c), [0, 1].map(|half| self.half(half, i, c)));
+            let noise = self.scale() * (e - o).powi(2);
+            if n < 2.0 || noise == 0.0 {
+                return own;
+            }
+            let around = sums[c] / n;
+            // How far a pixel is from the mean of those around it: by how far they are from each other.
+            let far = ((squares[c] - n * around * around) / (n - 1.0)).max(0.0) * (1.0 + 1.0 / n);
+            let level = (own * far * far + around * noise * noise) / (far * far + noise * noise);
+            level.max(e.min(o)).min(e.max(o))
+        })
     }
 
     /// What the square of [`Self::difference`] is to be multiplied by to be that of an error of the mean.
@@ -204,19 +244,21 @@ impl SelfError {
         let now = State::of(film)?;
         self.earlier.retain(|s| (0..2).all(|h| s.passes[h] <= now.passes[h]));
         let pixels = self.pixels.take().unwrap_or_else(|| (0..film.window().area()).collect());
-        let level = pixels.iter().map(|&i| (0..3).map(|c| now.mean(i, c)).sum::<f64>()).sum::<f64>();
+        // By number in the window, for the pixels that count.
+        let mut levels = vec![[0.0; 3]; film.window().area()];
+        pixels.iter().for_each(|&i| levels[i] = now.level(film.window(), i));
+        let level = pixels.iter().map(|&i| levels[i].iter().sum::<f64>()).sum::<f64>();
         let floor = 0.01 * (level / (3 * pixels.len()) as f64).powi(2);
         let estimate = |weight: Weight<'_>| self.estimate(film.window(), &now, &pixels, weight);
-        // Noise of a pixel is in its own level too: a first bright sample makes it bright and so its error relatively small.
-        // The square of the level without some of that noise is nearer to the square of the limit.
-        let level = |i: usize, c: usize| {
-            let noise = now.scale() * now.difference(i, c).powi(2);
-            (now.mean(i, c).powi(2) - CAREFUL * noise).max(0.0)
+        // The square of the level without some of the noise that may be in it.
+        let careful = |i: usize, c: usize| {
+            let (square, noise) = (levels[i][c].powi(2), now.scale() * now.difference(i, c).powi(2));
+            square - CAREFUL * noise.min(square)
         };
         let lit = floor > 0.0;
         let mut rmse = estimate(&|_, _| 1.0).sqrt();
-        let mut relmse = lit.then(|| estimate(&|i, c| 1.0 / (now.mean(i, c).powi(2) + floor)));
-        let relmse_careful = lit.then(|| now.noise(&pixels, &|i, c| 1.0 / (level(i, c) + floor)));
+        let mut relmse = lit.then(|| estimate(&|i, c| 1.0 / (levels[i][c].powi(2) + floor)));
+        let relmse_careful = lit.then(|| now.noise(&pixels, &|i, c| 1.0 / (careful(i, c) + floor)));
         let worst = now.worst(&pixels, film.window());
         let by_weights = relmse.zip(relmse_careful).map_or(0.0, |(plain, careful)| (careful / plain.value).ln());
         let no_interval = NoInterval::of(&now, &rmse, worst, by_weights);
