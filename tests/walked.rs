@@ -54,6 +54,27 @@ fn white_bodies_over_a_white_floor_are_white() {
     }
 }
 
+/// One body that is walked through and one by its model alone, which is asked for by name: light between them is neither lost nor counted twice.
+#[test]
+fn walked_bodies_and_others_are_white_together() {
+    let medium = "sigma_s = [40, 80, 160]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3\nmodel = ";
+    let bodies = camera([0.0, 3.0, 12.0], [0.5, -0.2, 0.0], 14.0, [16, 12])
+        + &sphere("large", [0.0; 3], 1.0, 24, "walked")
+        + &sphere("small", [1.6, -0.35, 0.4], 0.6, 24, "named")
+        + &rectangle("floor", [0.0, -1.02, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0], "floor")
+        + &translucent("walked", &format!("{medium}\"auto\""))
+        + &translucent("named", &format!("{medium}\"standard\""))
+        + &diffuse("floor", 1.0)
+        + &sky(1.0);
+    let scene = load(&bodies);
+    let with = |seed| SubsurfaceOptions { cache_samples: 65536, shape: Shape::Auto, ..walked(seed) };
+    let method = Subsurface::new(&scene, with(1)).unwrap();
+    assert_eq!([0, 1, 2].map(|o| method.walks(o)), [true, false, false]);
+    for c in means(5, |seed| picture(&scene, with(seed), 6)) {
+        agree(c, (1.0, 0.0), Within { errors: 5.0, noise: 0.012 }, "white together");
+    }
+}
+
 /// A ball lit from behind, where models are dark by 20 to 40 %, and a thin sheet seen from either side, where they are too bright by half: the
 /// mean of the picture is that of paths, within 2 % and the noise. In a medium of little and of much absorption, and of none in one channel.
 #[test]
@@ -105,6 +126,11 @@ fn threads_and_ranges_change_no_bit() {
         + &rectangle("lamp", [0.0, 4.0, -3.0], [1.0, 0.0, 0.0], [0.0, 0.5, 1.0], "glow")
         + &emissive("glow", 5.0)
         + &translucent("milk", "sigma_s = [5, 8, 12]\nsigma_a = [0.01, 0.1, 0.5]\ng = 0.5\neta = 1.3");
+    // One of them by its model, beside one that is walked through.
+    let text = text
+        + &sphere("c", [0.0, 2.2, 0.0], 0.8, 16, "named")
+        + &translucent("named", "preset = \"marble\"\nmodel = \"beam\"");
+    let text = text.replace("eta = 1.3", "eta = 1.3\nmodel = \"auto\"").replace("model = \"standard\"\n", "");
     let scene = load(&text);
     let rays = marmor::query::build(marmor::query::Backend::preferred(), &scene.meshes()).unwrap();
     let view = marmor::integrator::View { scene: &scene, rays: &*rays };
@@ -112,7 +138,8 @@ fn threads_and_ranges_change_no_bit() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| {
             let part = |ends: &[u32]| {
-                let method = Subsurface::new(&scene, walked(3)).unwrap();
+                let method = Subsurface::new(&scene, SubsurfaceOptions { shape: Shape::Auto, ..walked(3) }).unwrap();
+                assert_eq!([0, 1, 2, 3].map(|o| method.walks(o)), [true, true, false, false]);
                 run(&method, view, 3, ends[0]..ends[1], &mut []).0
             };
             let mut films = ends.windows(2).map(part);

@@ -320,7 +320,7 @@ impl Round<'_> {
             let flux = light * (PI * weight / self.of.count as f32);
             let arrived = Arrived { plan, at, w, flux };
             // What picked the light must not pick too which part of it goes on.
-            let draws = if self.of.walks() { draws.fork(2) } else { draws };
+            let draws = draws.fork(2);
             self.followed.enter(&arrived, depth, draws, found);
         });
     }

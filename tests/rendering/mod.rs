@@ -103,9 +103,11 @@ pub fn agree(a: (f64, f64), b: (f64, f64), within: Within, what: &str) {
     assert!((a.0 - b.0).abs() < within.errors * error, "{what}: {a:?} against {b:?}");
 }
 
-/// Every backend of this build.
+/// The backends that tests of this build are about: beside Embree not `bvh`, with which all tests run where it is alone.
 pub fn backends() -> impl Iterator<Item = Backend> {
-    Backend::ALL.into_iter().filter(|b| b.is_built_in())
+    let built = |backend: &Backend| backend.is_built_in();
+    let beside = Backend::ALL.iter().filter(|b| built(b)).count() > 1;
+    Backend::ALL.into_iter().filter(built).filter(move |b| !beside || *b != Backend::Bvh)
 }
 
 /// The default method with `cache_samples` a pass, without light scattered once.
