@@ -14,11 +14,16 @@ pub const PLAIN_SUM: usize = 1024;
 pub enum Detail {
     /// As the noise of the cache asks for: what a picture shows.
     Fine,
+    /// What is scaled by something that is noisier by far.
+    Middle,
     /// What is one of many that are added up.
     Coarse,
 }
 
-/// The largest share of a coarse sum that one node may be wrong by, at least.
+/// The largest share of a middling sum that one node may be wrong by, at least. Under walks it adds 1e-5 of relMSE to 16 passes of the lotus, which
+/// have 1e-2.
+const MIDDLE: f32 = 0.5;
+/// Of a coarse one.
 const COARSE: f32 = 2.0;
 
 /// A cache made ready for one estimator.
@@ -69,9 +74,11 @@ impl Gatherer {
         tally.exits += exits.len() as u64;
         let mut sums = vec![[0.0; 3]; exits.len()];
         let mut tuning = self.tuning;
-        if detail == Detail::Coarse {
-            tuning.error = tuning.error.max(COARSE);
-        }
+        tuning.error = match detail {
+            Detail::Fine => tuning.error,
+            Detail::Middle => tuning.error.max(MIDDLE),
+            Detail::Coarse => tuning.error.max(COARSE),
+        };
         let each = exits.iter().zip(keys);
         match &self.estimate {
             Estimate::Notes(cache) => out.extend(each.map(|(exit, &key)| notes(cache, model, exit, key, tally))),

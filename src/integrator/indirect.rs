@@ -253,7 +253,8 @@ impl Indirect {
             };
             sources = rows.of.into_iter().zip(caches.iter().zip(&self.walked)).map(source).collect();
         }
-        tally.clock.fill += start.elapsed().as_secs_f64() - (tally.clock.tree - trees);
+        let spent = start.elapsed().as_secs_f64() - (tally.clock.tree - trees);
+        *(if self.walks() { &mut tally.clock.walks } else { &mut tally.clock.fill }) += spent;
         Walks { patches, emerged }
     }
 }

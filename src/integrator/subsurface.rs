@@ -181,9 +181,13 @@ impl Subsurface {
                 GatherPoint { exit, place: asked.at.x, stream: asked.stream }
             };
             let points: Vec<GatherPoint> = group.iter().map(point).collect();
-            let detail = if group[0].1.later { Detail::Coarse } else { Detail::Fine };
-            plan.gather((view, &self.light.lights), (gatherer, detail), &points, &mut scratch, tally, &mut sums);
             let walked = pass.walked.get(object).and_then(Option::as_ref);
+            let detail = match walked {
+                _ if group[0].1.later => Detail::Coarse,
+                Some(_) if self.options.cut_error.is_none() => Detail::Middle,
+                _ => Detail::Fine,
+            };
+            plan.gather((view, &self.light.lights), (gatherer, detail), &points, &mut scratch, tally, &mut sums);
             for (((i, asked), point), sum) in group.iter().zip(&points).zip(&sums) {
                 let sum = walked.map_or(*sum, |walked| walked.radiance(&asked.at, &point.exit, *sum));
                 out[*i] += sum * asked.weight;
@@ -340,7 +344,9 @@ impl Integrator for Subsurface {
             let emerged = &walks.emerged[body.plan().body.object() as usize];
             Some(body.exitance((view, lights), (cache.as_ref()?, pass), patches?, emerged, tally))
         };
+        let start = std::time::Instant::now();
         let walked = bodies.zip(walks.patches).zip(&caches).map(exitance).collect();
+        tally.clock.walks += start.elapsed().as_secs_f64();
         Lit { caches, walked }
     }
 

@@ -13,6 +13,8 @@ pub struct Clock {
     pub fill: f64,
     /// Building trees over them, by the clock.
     pub tree: f64,
+    /// Paths that walk through bodies, and what leaves their patches, by the clock.
+    pub walks: f64,
     /// Rays of the camera and of the near field, of all threads.
     pub rays: f64,
     /// The near field but for its rays, of all threads.
@@ -32,4 +34,4 @@ impl Clock {
     }
 }
 
-adds_up!(Clock { survey, fill, tree, rays, near, gather });
+adds_up!(Clock { survey, fill, tree, walks, rays, near, gather });
