@@ -180,6 +180,14 @@ fn a_body_without_a_model_is_walked_through_where_that_can_be() {
     let checked = said(folder.path(), "check scene.toml");
     assert_eq!(checked.matches("paths do not walk through it: ").count(), 2, "{checked}");
     assert_eq!(checked.matches("paths walked through it").count(), 1, "{checked}");
+    // To what is thousands of mean free paths thick a plane is near; it says why, and walks that would take for ever are not advised.
+    let thick = unnamed(&ball("one", 0.0, 2.0, "wax", "")).replace("= 1.998", "= 1e6").replace("= 0.002", "= 1");
+    fs::write(folder.path().join("thick.toml"), thick).unwrap();
+    let told = said(folder.path(), "render thick.toml -o x.exr --spp 1");
+    assert!(
+        told.contains("collisions: to a body so thick a plane is near") && !told.contains("--shape walked"),
+        "{told}"
+    );
     for shape in ["half-space", "auto"] {
         said(folder.path(), &format!("render scene.toml -o {shape}.exr --spp 2 --shape {shape}"));
     }

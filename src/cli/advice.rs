@@ -165,7 +165,8 @@ impl<'a> Advice<'a> {
         let can = matches!(&self.prepared.method, Method::Subsurface(_))
             && !self.prepared.as_notes
             && method.bounces != Some(0)
-            && self.prepared.scene.not_walkable(t.index).is_empty();
+            && self.prepared.scene.not_walkable(t.index).is_empty()
+            && self.prepared.scene.long_walks(t.index).is_none();
         (can && t.verdict != Verdict::Trust).then(|| "--shape walked: within some percent".into())
     }
 

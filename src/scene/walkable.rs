@@ -5,8 +5,10 @@ use super::{Obstacle, ObstacleKind, Scene};
 use crate::bssrdf::ModelName;
 use crate::words::digits;
 
-/// Collisions of a walk, in the mean, from which a pass takes some seconds or more.
+/// Collisions of a walk, in the mean, from which a pass takes many seconds.
 const LONG: f64 = 3000.0;
+/// And from which nobody walks who has not asked for it: a pass takes some.
+const LONG_UNASKED: f64 = 1000.0;
 
 /// What decides how much light leaves a body where.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -39,7 +41,7 @@ impl Scene {
         }
         let barred = self.not_walkable(object).into_iter().next();
         let long = || {
-            let collisions = self.collisions(object).filter(|c| *c > LONG)?;
+            let collisions = self.collisions(object).filter(|c| *c > LONG_UNASKED)?;
             let walk = digits(collisions, 2);
             Some(format!("a walk through it has some {walk} collisions: to a body so thick a plane is near"))
         };
@@ -75,8 +77,9 @@ impl Scene {
     /// surface S light that enters flies η² 4V/S, whatever its shape, if nothing is absorbed.
     fn collisions(&self, object: u32) -> Option<f64> {
         let t = self.surface(object).inside.as_ref()?;
-        let thickness = self.body(object)?.thickness?;
-        Some(2.0 * f64::from(t.medium.eta).powi(2) * thickness * f64::from(t.medium.sigma_t().max()))
+        let shape = self.body(object)?.shape()?;
+        let twice_volume_by_surface = shape.thickness / (1.0 + (shape.curvature * shape.thickness).max(0.0));
+        Some(2.0 * f64::from(t.medium.eta).powi(2) * twice_volume_by_surface * f64::from(t.medium.sigma_t().max()))
     }
 
     /// That walks through the object of number `object` take long.
