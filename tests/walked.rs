@@ -36,43 +36,41 @@ fn truth(scene: &Scene, runs: u64, passes: u32) -> [(f64, f64); 3] {
     means(runs, |seed| of(100 + seed))
 }
 
-/// Two bodies that touch nearly and absorb nothing, above a white floor under a white sky: light from sky, floor, body and body again, mirrored
-/// and not, and not a part of it is lost or counted twice.
-#[test]
-fn white_bodies_over_a_white_floor_are_white() {
-    let medium = "sigma_s = [4, 8, 16]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3";
-    let bodies = camera([0.0, 3.0, 12.0], [0.5, -0.2, 0.0], 14.0, [16, 12])
-        + &sphere("large", [0.0; 3], 1.0, 24, "milk")
-        + &sphere("small", [1.6, -0.35, 0.4], 0.6, 24, "milk")
+/// Two balls that touch nearly, of the materials `large` and `small`, above a white floor under a white sky.
+fn under_a_white_sky(large: &str, small: &str, media: &str) -> Scene {
+    let text = camera([0.0, 3.0, 12.0], [0.5, -0.2, 0.0], 14.0, [16, 12])
+        + &sphere("large", [0.0; 3], 1.0, 24, large)
+        + &sphere("small", [1.6, -0.35, 0.4], 0.6, 24, small)
         + &rectangle("floor", [0.0, -1.02, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0], "floor")
-        + &translucent("milk", medium)
+        + media
         + &diffuse("floor", 1.0)
         + &sky(1.0);
-    let scene = load(&bodies);
-    for c in means(5, |seed| picture(&scene, SubsurfaceOptions { cache_samples: 65536, ..walked(seed) }, 6)) {
-        agree(c, (1.0, 0.0), Within { errors: 5.0, noise: 0.012 }, "white");
+    load(&text)
+}
+
+/// That nothing is lost there or counted twice: light from sky, floor, body and body again, mirrored and not.
+fn is_white(scene: &Scene, shape: Shape, what: &str) {
+    let with = |seed| SubsurfaceOptions { cache_samples: 65536, shape, ..walked(seed) };
+    for c in means(5, |seed| picture(scene, with(seed), 6)) {
+        agree(c, (1.0, 0.0), Within { errors: 5.0, noise: 0.012 }, what);
     }
 }
 
-/// One body that is walked through and one by its model alone, which is asked for by name: light between them is neither lost nor counted twice.
+#[test]
+fn white_bodies_over_a_white_floor_are_white() {
+    let milk = translucent("milk", "sigma_s = [4, 8, 16]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3");
+    is_white(&under_a_white_sky("milk", "milk", &milk), Shape::Walked, "white");
+}
+
+/// One body that is walked through and one by its model alone, which is asked for by name.
 #[test]
 fn walked_bodies_and_others_are_white_together() {
     let medium = "sigma_s = [40, 80, 160]\nsigma_a = [0, 0, 0]\ng = 0\neta = 1.3\nmodel = ";
-    let bodies = camera([0.0, 3.0, 12.0], [0.5, -0.2, 0.0], 14.0, [16, 12])
-        + &sphere("large", [0.0; 3], 1.0, 24, "walked")
-        + &sphere("small", [1.6, -0.35, 0.4], 0.6, 24, "named")
-        + &rectangle("floor", [0.0, -1.02, 0.0], [8.0, 0.0, 0.0], [0.0, 0.0, -8.0], "floor")
-        + &translucent("walked", &format!("{medium}\"auto\""))
-        + &translucent("named", &format!("{medium}\"standard\""))
-        + &diffuse("floor", 1.0)
-        + &sky(1.0);
-    let scene = load(&bodies);
-    let with = |seed| SubsurfaceOptions { cache_samples: 65536, shape: Shape::Auto, ..walked(seed) };
-    let method = Subsurface::new(&scene, with(1)).unwrap();
+    let of = |name: &str, model: &str| translucent(name, &format!("{medium}{model:?}"));
+    let scene = under_a_white_sky("walked", "named", &(of("walked", "auto") + &of("named", "standard")));
+    let method = Subsurface::new(&scene, SubsurfaceOptions { shape: Shape::Auto, ..walked(1) }).unwrap();
     assert_eq!([0, 1, 2].map(|o| method.walks(o)), [true, false, false]);
-    for c in means(5, |seed| picture(&scene, with(seed), 6)) {
-        agree(c, (1.0, 0.0), Within { errors: 5.0, noise: 0.012 }, "white together");
-    }
+    is_white(&scene, Shape::Auto, "white together");
 }
 
 /// A ball lit from behind, where models are dark by 20 to 40 %, and a thin sheet seen from either side, where they are too bright by half: the

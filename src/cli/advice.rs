@@ -2,11 +2,11 @@
 //! better one, and whether the camera sees anything. `check` says all of it, `render` a line for each body.
 
 use super::setup::{Method, Prepared};
-use marmor::bssrdf::{ModelName, Unmeasured, measured_albedos};
+use marmor::bssrdf::{Unmeasured, measured_albedos};
 use marmor::film::Window;
 use marmor::integrator::{LocalShape, ModelOnBody, TOLERANCE, Trustworthiness, Verdict, View};
 use marmor::render::{Aim, nothing_in_view, shares};
-use marmor::scene::{Exitance, Scene, Shape};
+use marmor::scene::{ExitanceBy, Scene};
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 
@@ -146,17 +146,10 @@ impl<'a> Advice<'a> {
     /// Why they do not, where nobody has asked for that.
     fn not_walked(&self, t: &Trustworthiness) -> Option<String> {
         let Method::Subsurface(_) = &self.prepared.method else { return None };
-        let shape = self.prepared.file.method.shape();
-        match self.prepared.scene.exitance(t.index, shape) {
-            Exitance::Model(why) if shape == Shape::Auto && !self.is_named(t) && mend(t).is_none() => Some(why),
+        match self.prepared.scene.exitance_by(t.index, self.prepared.file.method.shape()) {
+            ExitanceBy::ModelFor(why) if mend(t).is_none() => Some(why),
             _ => None,
         }
-    }
-
-    /// Whether the body's model is asked for by name.
-    fn is_named(&self, t: &Trustworthiness) -> bool {
-        let inside = self.prepared.scene.surface(t.index).inside.as_ref();
-        inside.is_some_and(|inside| inside.model != ModelName::AUTO)
     }
 
     /// That the model need not be all, where paths can walk through the body.

@@ -18,7 +18,7 @@ use crate::memory;
 use crate::optics::{Medium, reflect, reflectance, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
-use crate::scene::{Body, EntrySampling, Object, Scene, Shape, View};
+use crate::scene::{Body, EntrySampling, ExitanceBy, Object, Scene, Shape, View};
 use crate::tally::{Clock, Tally};
 use std::sync::{Arc, Once};
 
@@ -65,7 +65,7 @@ impl Subsurface {
         }
         let by_walks = |plan: &Option<Arc<Plan>>| {
             let plan = plan.as_ref().filter(|_| options.bounces > 0);
-            plan.is_some_and(|plan| scene.exitance(plan.body.object(), options.shape).is_by_walks())
+            plan.is_some_and(|plan| scene.exitance_by(plan.body.object(), options.shape) == ExitanceBy::Walks)
         };
         let walked: Vec<bool> = plans.iter().map(by_walks).collect();
         let modelled = modelled(&plans, &walked, &options);
@@ -238,12 +238,16 @@ fn can_be_walked(scene: &Scene, plans: &[Option<Arc<Plan>>], options: &Subsurfac
         let what = "`shape = \"walked\"` is of all the light, and `bounces = 0` of what comes straight from lights";
         return Err(Error::scene(format!("{what}: leave out one of them")));
     }
-    let bodies = plans.iter().flatten().map(|plan| plan.body.object());
-    let mut refusals: Vec<String> = bodies.flat_map(|object| scene.not_walkable(object)).collect();
+    let mut refusals: Vec<String> = Vec::new();
+    for refusal in plans.iter().flatten().flat_map(|plan| scene.not_walkable(plan.body.object())) {
+        // What stands between two bodies is in the way of both.
+        if !refusals.contains(&refusal) {
+            refusals.push(refusal);
+        }
+    }
     if refusals.is_empty() {
         return Ok(());
     }
-    refusals.dedup();
     refusals.push("`shape = \"walked\"` is for bodies that paths can walk through: mend that, or leave it out".into());
     Err(Error::scene(refusals.join("\n")))
 }

@@ -35,7 +35,7 @@ pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread};
-pub use walkable::Exitance;
+pub use walkable::ExitanceBy;
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
 
 // For what is above this room.

@@ -12,40 +12,31 @@ const LONG_UNASKED: f64 = 1000.0;
 
 /// What decides how much light leaves a body where.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Exitance {
-    /// Its model alone, and why.
-    Model(String),
+pub enum ExitanceBy {
+    /// Its model alone, as asked for; or it is not translucent.
+    Model,
+    /// Its model alone, for this keeps paths from walking through it.
+    ModelFor(String),
     /// Paths that walk through it; the model has what is finer than a patch of its surface.
     Walks,
 }
 
-impl Exitance {
-    /// Whether paths do.
-    pub fn is_by_walks(&self) -> bool {
-        *self == Self::Walks
-    }
-}
-
 impl Scene {
-    /// What decides how much light leaves the translucent object of number `object` under `shape`.
-    pub fn exitance(&self, object: u32, shape: Shape) -> Exitance {
-        let model = |why: String| Exitance::Model(why);
-        let Some(t) = &self.surface(object).inside else { return model("not translucent".into()) };
+    /// What decides how much light leaves the object of number `object` under `shape`.
+    pub fn exitance_by(&self, object: u32, shape: Shape) -> ExitanceBy {
+        let Some(t) = &self.surface(object).inside else { return ExitanceBy::Model };
         match shape {
-            Shape::HalfSpace => return model("as asked for".into()),
-            Shape::Walked => return Exitance::Walks,
+            Shape::HalfSpace => return ExitanceBy::Model,
+            Shape::Walked => return ExitanceBy::Walks,
+            Shape::Auto if t.model != ModelName::AUTO => return ExitanceBy::Model,
             Shape::Auto => {}
         }
-        if t.model != ModelName::AUTO {
-            return model(format!("model `{}` is asked for by name", t.model.name()));
-        }
-        let barred = self.not_walkable(object).into_iter().next();
         let long = || {
-            let collisions = self.collisions(object).filter(|c| *c > LONG_UNASKED)?;
-            let walk = digits(collisions, 2);
-            Some(format!("a walk through it has some {walk} collisions: to a body so thick a plane is near"))
+            let collisions = digits(self.collisions(object).filter(|c| *c > LONG_UNASKED)?, 2);
+            Some(format!("a walk through it has some {collisions} collisions: to a body so thick a plane is near"))
         };
-        barred.or_else(long).map_or(Exitance::Walks, model)
+        let barred = self.not_walkable(object).into_iter().next();
+        barred.or_else(long).map_or(ExitanceBy::Walks, ExitanceBy::ModelFor)
     }
 
     /// What keeps paths from walking through the object of number `object`, beside its model; empty where nothing does.

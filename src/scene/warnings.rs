@@ -2,7 +2,7 @@
 
 use super::file::SceneFile;
 use super::options::MethodName;
-use super::{ObstacleKind, Scene, Translucent, energy};
+use super::{ExitanceBy, ObstacleKind, Scene, Translucent, energy};
 use crate::geometry::Solid;
 use crate::optics::{ChannelOptics, Trust};
 use crate::words::{albedo, short};
@@ -62,7 +62,7 @@ fn models_are_used(file: &SceneFile) -> bool {
 
 /// Whether it alone says how much light leaves the object.
 fn model_decides(file: &SceneFile, scene: &Scene, object: u32) -> bool {
-    models_are_used(file) && !scene.exitance(object, file.method.shape()).is_by_walks()
+    models_are_used(file) && scene.exitance_by(object, file.method.shape()) != ExitanceBy::Walks
 }
 
 /// Channels of a medium that is none: models have no light there, `volume_path` has clear glass.
