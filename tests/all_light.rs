@@ -221,9 +221,11 @@ fn light_between_petals_ends_with_every_model() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/lotus");
     let text = std::fs::read_to_string(folder.join("scene.toml")).unwrap();
     let text = text.replace("resolution = [512, 512]", "resolution = [12, 12]");
+    let own = "model = \"standard\"";
+    assert!(text.contains(own));
     for model in ModelName::models() {
-        let marble = format!("preset = \"marble\"\nmodel = {:?}\nthickness = 2", model.name());
-        let scene = load_in(&folder, &text.replace("preset = \"marble\"", &marble));
+        let marble = format!("model = {:?}\nthickness = 2", model.name());
+        let scene = load_in(&folder, &text.replace(own, &marble));
         let (samples, mut tally) = (4096, Tally::default());
         let method = subsurface(&scene, options(Estimator::Cut, samples, 1));
         let rays = marmor::query::build(Backend::preferred(), &scene.meshes()).unwrap();
