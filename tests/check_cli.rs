@@ -171,7 +171,10 @@ fn a_body_without_a_model_is_walked_through_where_that_can_be() {
     let unnamed = |text: &str| scene(text).replace("model = \"standard\"\n", "");
     let folder = command::folder(&unnamed(&ball("one", 0.0, 2.0, "wax", "")));
     let told = said(folder.path(), "render scene.toml -o x.exr --spp 1");
-    assert!(told.contains("one: paths walked through it say how much leaves where, `beam` what is finer"), "{told}");
+    assert!(
+        told.contains("one: paths walked through it say how much leaves where, `standard` what is finer"),
+        "{told}"
+    );
     let named = said(folder.path(), "render scene.toml -o x.exr --spp 1 --model beam");
     assert!(named.contains("one: model `beam`, expected error") && !named.contains("walked"), "{named}");
     let touching =

@@ -52,8 +52,9 @@ fn a_render_writes_what_it_says() {
     assert_eq!(lines.len(), 4);
     for (i, line) in lines.iter().enumerate() {
         assert_eq!(line["pass"], i + 1);
+        // A quarter of what is asked for: the body is walked through.
         assert_eq!(line["rays"]["camera"], (i + 1) * 40 * 30);
-        assert_eq!(line["gather"]["samples"], (i + 1) * 500);
+        assert_eq!(line["gather"]["samples"], (i + 1) * 125);
         assert!(line["seconds_total"].as_f64() >= line["seconds_gather"].as_f64());
         assert_eq!(line["non_finite"], 0);
         assert!(line.get("rmse").is_none(), "no figure without a reference");
@@ -198,7 +199,7 @@ fn a_model_without_the_first_order_is_told() {
 fn light_that_faces_away_is_told() {
     let folder = folder();
     let output = marmor(folder.path(), &["render", "scene.toml", "-o", "x.png", "-D", "object.1.flip=true"]);
-    assert!(text(&output.stderr).contains("warning: none of 2000 samples"), "{}", text(&output.stderr));
+    assert!(text(&output.stderr).contains("warning: none of 500 samples"), "{}", text(&output.stderr));
 }
 
 /// Each wrong call or input: the arguments, the exit code, and words of its one message.

@@ -65,6 +65,11 @@ impl Default for SubsurfaceOptions {
 }
 
 impl SubsurfaceOptions {
+    /// The same where paths through the body say how much leaves: what is left to the sum needs fewer samples.
+    fn under_walks(&self) -> Self {
+        Self { cache_samples: (self.cache_samples / SHARE_UNDER_WALKS).max(1), ..*self }
+    }
+
     /// Whether sums may be cut in a near part and the rest, and exits share work; the lecture's law takes the cache alone, exit
     /// by exit.
     pub fn splits(&self) -> bool {
@@ -72,6 +77,8 @@ impl SubsurfaceOptions {
     }
 }
 
+/// Of the samples asked for, one in so many is cached where walks bring what the others would.
+const SHARE_UNDER_WALKS: u32 = 4;
 /// A sum over the cached samples whose relative variance would be above this, if they were independent, gets a near field.
 const NOISY: f64 = 1.0 / 8.0;
 /// Radius of the near field in distances between cached samples.
@@ -111,13 +118,20 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Of object number `object`; `None` where it is not translucent or has no area.
+    /// Of object number `object`; `None` where it is not translucent or has no area. `walked`: paths through the body say how much leaves where.
     ///
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
-    pub fn new(scene: &Scene, lights: &Lights, object: u32, options: SubsurfaceOptions) -> Result<Option<Self>> {
+    pub fn new(
+        scene: &Scene,
+        lights: &Lights,
+        object: u32,
+        walked: bool,
+        options: SubsurfaceOptions,
+    ) -> Result<Option<Self>> {
         let (Some(t), Some(_)) = (&scene.surface(object).inside, scene.body(object)) else { return Ok(None) };
-        let Some(body) = CachedBody::new(scene, object, t.build()?) else { return Ok(None) };
+        let (model, options) = if walked { (t.model_under_walks(), options.under_walks()) } else { (t.model, options) };
+        let Some(body) = CachedBody::new(scene, object, model.build(&t.medium, &t.options())?) else { return Ok(None) };
         let envelope = Envelope::new(&*body.model, &t.medium);
         let streams = Turn::seeds(options.seed).map(|seed| CacheStream::new(options.points, seed, object.into()));
         let directions = match options.entry {

@@ -120,7 +120,7 @@ impl<'a> Advice<'a> {
     /// A body in one line: its model, the expected error of it, and what to type instead.
     pub fn line(&self, t: &Trustworthiness) -> String {
         if self.walks(t) {
-            return format!("{}: {}", t.object, walked(t));
+            return format!("{}: {}", t.object, self.walked(t));
         }
         let own = t.own().map_or(String::new(), |own| match own.distribution {
             Some(error) => format!("model {}, expected error {}{}", name(own), percent(error), darker(t)),
@@ -141,6 +141,15 @@ impl<'a> Advice<'a> {
     /// Whether paths walk through the body.
     fn walks(&self, t: &Trustworthiness) -> bool {
         matches!(&self.prepared.method, Method::Subsurface(s) if s.walks(t.index))
+    }
+
+    /// What is said of a body that they do walk through.
+    fn walked(&self, t: &Trustworthiness) -> String {
+        let inside = self.prepared.scene.surface(t.index).inside.as_ref();
+        let model = inside.map_or("the model", |inside| inside.model_under_walks().name());
+        format!(
+            "paths walked through it say how much leaves where, `{model}` what is finer than a patch: within some percent and noise"
+        )
     }
 
     /// Why they do not, where nobody has asked for that.
@@ -167,7 +176,7 @@ impl<'a> Advice<'a> {
     pub fn paragraph(&self, t: &Trustworthiness) -> Vec<String> {
         let mut lines = vec![format!("{} (material {}):", t.object, t.material)];
         if self.walks(t) {
-            lines.push(format!("  {}", walked(t)));
+            lines.push(format!("  {}", self.walked(t)));
             lines.push("  its model alone, --shape half-space:".into());
         }
         lines.extend(self.not_walked(t).map(|why| format!("  paths do not walk through it: {why}")));
@@ -320,12 +329,6 @@ impl<'a> Advice<'a> {
         }
         more
     }
-}
-
-/// What is said of a body that paths walk through.
-fn walked(t: &Trustworthiness) -> String {
-    let model = t.own().map_or(String::new(), |own| format!(", {} what is finer than a patch", name(own)));
-    format!("paths walked through it say how much leaves where{model}: within some percent and noise")
 }
 
 const GIVE_THICKNESS: &str = "give it a thickness: that of the object, or a closed mesh, both faces and the rim";

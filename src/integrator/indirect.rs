@@ -24,7 +24,7 @@ use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// Paths of each kind in a pass for so many of its samples.
-const SAMPLES_PER_PATH: u32 = 8;
+const SAMPLES_PER_PATH: u32 = 4;
 /// Rounds in which light leaves bodies and meets them again. What is left then would go on without end.
 const MOST_ROUNDS: u32 = 1000;
 /// Paths of one task; exits of one task are neighbours, and gathered together.
@@ -141,9 +141,9 @@ impl Indirect {
         self.once
     }
 
-    /// Memory beside that of the caches, of so many samples for each object, where half of the paths arrive; for a picture of so many pixels
+    /// Memory beside that of the caches, of so many samples for each object, where half of the paths arrive
     /// [bytes].
-    pub fn bytes(&self, samples: &[u64], pixels: f64) -> u64 {
+    pub fn bytes(&self, samples: &[u64]) -> u64 {
         let kinds = if self.surfaces.is_some() { 3 } else { 2 };
         let of = |(samples, body): (&u64, &Option<WalkedBody>)| {
             if *samples == 0 {
@@ -152,7 +152,7 @@ impl Indirect {
             // What bodies send on by their models is gathered from a copy of the cache.
             let twice = if body.is_some() { 0 } else { *samples };
             let rows = (twice + kinds * u64::from(self.count) / 2) * size_of::<CachedSample>() as u64;
-            rows + body.as_ref().map_or(0, |body| body.bytes(pixels))
+            rows + body.as_ref().map_or(0, |body| body.bytes())
         };
         samples.iter().zip(&self.walked).map(of).sum()
     }

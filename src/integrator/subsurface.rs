@@ -58,15 +58,13 @@ impl Subsurface {
         let needed = u128::from(samples) * BYTES_PER_SAMPLE;
         memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
         let lights = Lights::new(scene);
-        let plan = |object| Ok(Plan::new(scene, &lights, object, options)?.map(Arc::new));
+        let walks = |object: u32| options.bounces > 0 && scene.exitance_by(object, options.shape) == ExitanceBy::Walks;
+        let plan = |object| Ok(Plan::new(scene, &lights, object, walks(object), options)?.map(Arc::new));
         let plans: Vec<Option<Arc<Plan>>> = objects.map(plan).collect::<Result<_>>()?;
         if options.shape == Shape::Walked {
             can_be_walked(scene, &plans, &options)?;
         }
-        let by_walks = |plan: &Option<Arc<Plan>>| {
-            let plan = plan.as_ref().filter(|_| options.bounces > 0);
-            plan.is_some_and(|plan| scene.exitance_by(plan.body.object(), options.shape) == ExitanceBy::Walks)
-        };
+        let by_walks = |plan: &Option<Arc<Plan>>| plan.as_ref().is_some_and(|plan| walks(plan.body.object()));
         let walked: Vec<bool> = plans.iter().map(by_walks).collect();
         let modelled = modelled(&plans, &walked, &options);
         let goes_on = walked.contains(&true) || goes_on(scene, &modelled, &options);
@@ -373,11 +371,10 @@ impl Integrator for Subsurface {
         self.options.splits()
     }
 
-    fn pass_bytes(&self, view: View<'_>) -> u64 {
+    fn pass_bytes(&self, _: View<'_>) -> u64 {
         let samples = |plan: &Option<Arc<Plan>>| plan.as_ref().map_or(0, |plan| u64::from(plan.samples));
         let samples: Vec<u64> = self.plans.iter().map(samples).collect();
-        let [width, height] = view.scene.camera.resolution.map(f64::from);
-        let more = self.indirect.as_ref().map_or(0, |indirect| indirect.bytes(&samples, width * height));
+        let more = self.indirect.as_ref().map_or(0, |indirect| indirect.bytes(&samples));
         samples.iter().sum::<u64>() * TAKEN_PER_SAMPLE + more
     }
 

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::sync::{Arc, OnceLock};
 
 /// Patches of the first pass: 2 to this.
-const DEPTH: f64 = 10.0;
+const DEPTH: f64 = 10.5;
 /// And at most.
 const DEEPEST: f64 = 14.0;
 /// Patches grow in number as passes to this power: the noise of a place, which fewer and fewer paths of a pass serve, and what patches are too
@@ -31,9 +31,8 @@ const GROWTH: f64 = 1.0 / 3.0;
 const FACETS: f64 = 32.0;
 /// And for each at the least: area that is told by facets is off by what its borders cut. As many paths for moments.
 const FEWEST: f64 = 32.0;
-/// Parts of a path where light enters, in the mean, for a picture of as many pixels; they grow with the root of its pixels, within bounds.
-const PARTS: (f64, f64) = (2.0, 128.0 * 128.0);
-const PARTS_BOUNDS: [f64; 2] = [1.0, 16.0];
+/// Parts of a path where light enters, in the mean.
+const PARTS: f64 = 4.0;
 /// Places in a patch where the model is asked.
 const PLACES: u32 = 4;
 /// Patches in whose mean light a patch's dark places take part: 2 to this.
@@ -51,11 +50,6 @@ const ADJOINT: usize = 1 << 13;
 const DARK: f64 = 0.02;
 /// Rays across and down the picture that tell what is seen, at most.
 const CELLS: u32 = 64;
-
-/// Parts of a path in the mean, for a picture of so many pixels.
-fn parts(pixels: f64) -> f64 {
-    (PARTS.0 * (pixels / PARTS.1).sqrt()).clamp(PARTS_BOUNDS[0], PARTS_BOUNDS[1])
-}
 
 /// Points of objects that the camera sees from outside.
 pub fn visible(view: View<'_>) -> Vec<(u32, SurfacePoint)> {
@@ -169,11 +163,11 @@ impl WalkedBody {
         2_f64.powf(self.finest().min(DEEPEST)) as u32
     }
 
-    /// Memory of facets and patches, and of what the paths of a pass bring in a picture of so many pixels [bytes].
-    pub fn bytes(&self, pixels: f64) -> u64 {
+    /// Memory of facets and patches, and of what the paths of a pass bring [bytes].
+    pub fn bytes(&self) -> u64 {
         // Lists grow by doubling; each part of a path comes out twice, and is there twice while tasks are collected.
         let facets = self.facets.count() as u64 * (2 * size_of::<Facet>() + 8 * size_of::<f32>()) as u64;
-        let emerged = 4.0 * parts(pixels) * f64::from(self.paths) * size_of::<Emerged>() as f64;
+        let emerged = 4.0 * PARTS * f64::from(self.paths) * size_of::<Emerged>() as f64;
         facets + u64::from(self.most_patches()) * size_of::<(Patch, Sums)>() as u64 + emerged as u64
     }
 
@@ -215,8 +209,7 @@ impl WalkedBody {
             let mut windows = paths.importance(view, object, bounds, &seen, (ADJOINT, key))?;
             let worth = |(x, flux): &(DVec3, Rgb)| f64::from(windows.worth(*x, *flux));
             let mean = entering.iter().map(worth).sum::<f64>() / entering.len() as f64;
-            let [width, height] = view.scene.camera.resolution.map(f64::from);
-            let factor = (parts(width * height) / mean) as f32;
+            let factor = (PARTS / mean) as f32;
             (factor.is_finite() && factor > 0.0).then(|| windows.scale(factor))?;
             Some(windows)
         };

@@ -1,6 +1,7 @@
 //! What a boundary and a medium do to light, before any model of scattering. Not for: BSSRDFs.
 //! Read first: `fresnel.rs`, `medium.rs`; `catalogue.rs` lists measured media with their sources.
 
+mod ball;
 mod catalogue;
 mod fresnel;
 mod half_space;
@@ -11,6 +12,7 @@ mod phase;
 mod validity;
 mod way_out;
 
+pub use ball::{ANGLES, Ball};
 pub use catalogue::{CATALOGUE, Coefficients, ListedReflectance, Measured, TANK_ML, find, find_or_explain};
 pub use fresnel::{Split, reflect, reflectance, refract, split, transmittance};
 pub use half_space::HalfSpace;

@@ -207,8 +207,10 @@ impl Prepared {
     fn exitance(&self) -> String {
         let Method::Subsurface(method) = &self.method else { return String::new() };
         let of = |(i, o): (u32, &Object)| {
-            let how = if method.walks(i) { "walks" } else { "model" };
-            self.scene.surface(i).is_translucent().then(|| format!("{}: {how}", o.name))
+            let inside = self.scene.surface(i).inside.as_ref()?;
+            let how =
+                if method.walks(i) { format!("walks, {}", inside.model_under_walks().name()) } else { "model".into() };
+            Some(format!("{}: {how}", o.name))
         };
         (0..).zip(&self.scene.objects).filter_map(of).collect::<Vec<_>>().join(", ")
     }

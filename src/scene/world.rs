@@ -213,6 +213,12 @@ impl Translucent {
         self.model.build(&self.medium, &self.options())
     }
 
+    /// The model that says what is finer than walks tell: the one asked for, or the smoothest. Which one it is hardly matters there
+    /// (docs/shape.md), and `standard` has light of every order in one sum without noise of its own.
+    pub fn model_under_walks(&self) -> ModelName {
+        if self.model == ModelName::AUTO { ModelName::STANDARD } else { self.model }
+    }
+
     /// What the model is made with.
     pub fn options(&self) -> ModelOptions {
         let &Self { exit_normalisation, thickness, calibrated, .. } = self;

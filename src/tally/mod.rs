@@ -44,6 +44,8 @@ pub struct WalkTally {
     pub walks: u64,
     /// Collisions.
     pub collisions: u64,
+    /// Balls that were passed at once, with all collisions in them.
+    pub jumps: u64,
     /// Flights that needed no ray.
     pub clear: u64,
     /// Rays inside bodies.
@@ -65,6 +67,6 @@ impl WalkTally {
     }
 }
 
-adds_up!(WalkTally { walks, collisions, clear, rays, photons, vertices, connections, losses });
+adds_up!(WalkTally { walks, collisions, jumps, clear, rays, photons, vertices, connections, losses });
 
 adds_up!(Tally { rays, gather, walk, clock });

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// A box of 4 x 3 x 2 about the origin.
-fn block(medium: &str, rest: &str) -> Scene {
+pub(super) fn block(medium: &str, rest: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let mut text = String::new();
     for y in [1.5, -1.5] {

@@ -2,6 +2,7 @@
 
 use super::draws::PathSampler;
 use super::facets::Bend;
+use super::jumps::Jumps;
 use super::spectrum::{Coefficients, Spectrum};
 use crate::geometry::{Clearance, SurfacePoint, Union};
 use crate::integrator::View;
@@ -45,6 +46,8 @@ pub struct Interior {
     pub contacts: Contacts,
     /// What bounds it, where its parts meet; paths of a body that is not [`Self::nested`] pass what lies inside.
     pub union: Option<Arc<Union>>,
+    /// Balls that paths jump through whose collisions are nobody's business.
+    pub jumps: Option<Jumps>,
 }
 
 /// The straight flight between two collisions.
@@ -73,6 +76,14 @@ pub trait WalkObserver {
     fn plays_roulette(&self) -> bool {
         false
     }
+
+    /// Whether paths may jump from collision to collision, past others.
+    fn jumps(&self) -> bool {
+        false
+    }
+
+    /// A jump has passed one or more collisions.
+    fn passed(&mut self) {}
 
     /// A lamp inside the body ends the path, which came to it along `w`.
     fn lamp(&mut self, _hit: &Hit, _w: Vec3, _spectrum: &Spectrum) {}
@@ -170,6 +181,7 @@ impl Interior {
             absorbs: None,
             contacts: Contacts::new(),
             union: None,
+            jumps: None,
         }
     }
 
@@ -218,10 +230,49 @@ impl Interior {
         self.phase.sample(w, u).normalize()
     }
 
-    /// From `from` along `w`, a collision at `distance` unless a surface comes first. No ray where the table is sure.
+    /// From a collision at `x`, `free` of surfaces so far around, at once to the surface of a ball, and the direction there.
     #[inline]
-    pub fn flight(&self, view: View<'_>, from: DVec3, w: Vec3, distance: f32, tally: &mut WalkTally) -> Flight {
-        if distance < self.clearance.at(from) {
+    fn jump(
+        &self,
+        (x, free): (DVec3, f32),
+        spectrum: &mut Spectrum,
+        draws: &mut PathSampler,
+        watch: &mut impl WalkObserver,
+        tally: &mut WalkTally,
+    ) -> Option<(DVec3, Vec3)> {
+        let jumps = self.jumps.as_ref().filter(|_| watch.jumps())?;
+        let landing = jumps.jump(x, self.clearance.level(free), spectrum, draws)?;
+        tally.jumps += 1;
+        if !landing.straight {
+            watch.passed();
+        }
+        Some((landing.x, landing.w))
+    }
+
+    /// Where and how light goes on that came to a collision.
+    pub fn scattered(
+        &self,
+        (x, w): (DVec3, Vec3),
+        spectrum: &mut Spectrum,
+        draws: &mut PathSampler,
+        watch: &mut impl WalkObserver,
+        tally: &mut WalkTally,
+    ) -> (DVec3, Vec3) {
+        self.jump((x, self.clearance.at(x)), spectrum, draws, watch, tally)
+            .unwrap_or_else(|| (x, self.scatter(w, draws)))
+    }
+
+    /// From `from` along `w`, a collision at `distance` unless a surface comes first. No ray up to `free`, where no surface is.
+    #[inline]
+    pub fn flight(
+        &self,
+        view: View<'_>,
+        (from, free): (DVec3, f32),
+        w: Vec3,
+        distance: f32,
+        tally: &mut WalkTally,
+    ) -> Flight {
+        if distance < free {
             tally.clear += 1;
             return Flight::Collision(from + w.as_dvec3() * f64::from(distance));
         }
@@ -261,9 +312,10 @@ impl Interior {
         tally.walks += 1;
         let whole = spectrum.value(&self.medium).max();
         let (mut collisions, mut bounces, mut edge) = (0_u32, 0_u32, None);
+        let mut free = self.clearance.at(from);
         loop {
             let distance = spectrum.distance(&self.medium, draws.number());
-            match self.flight(view, from, w, distance, tally) {
+            match self.flight(view, (from, free), w, distance, tally) {
                 Flight::Collision(x) => {
                     tally.collisions += 1;
                     (collisions, bounces) = (collisions + 1, 0);
@@ -277,6 +329,11 @@ impl Interior {
                         if !russian_roulette(left / ROULETTE_BELOW, spectrum, draws) {
                             return None;
                         }
+                    }
+                    free = self.clearance.at(x);
+                    if let Some((to, next)) = self.jump((x, free), spectrum, draws, watch, tally) {
+                        (from, w, edge, free) = (to, next, None, self.clearance.at(to));
+                        continue;
                     }
                     let next = self.scatter(w, draws);
                     let phase = self.phase(w, next);
@@ -299,7 +356,7 @@ impl Interior {
                         return Some(WalkExit { at, w: next, straight });
                     }
                     w = next;
-                    (from, edge, bounces) = (at.leave(w), None, bounces + 1);
+                    (from, edge, bounces, free) = (at.leave(w), None, bounces + 1, 0.0);
                 }
                 Flight::Opaque(at, t, albedo) => {
                     spectrum.fly(t);
@@ -312,7 +369,7 @@ impl Interior {
                     }
                     w = cosine_hemisphere(at.n_geometric, draws.pair());
                     watch.turned(Turn::Reflected(&at, w));
-                    (from, edge, bounces) = (at.leave(w), None, bounces + 1);
+                    (from, edge, bounces, free) = (at.leave(w), None, bounces + 1, 0.0);
                 }
                 Flight::Lamp(hit) => {
                     spectrum.fly(hit.t);

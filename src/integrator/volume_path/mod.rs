@@ -13,6 +13,7 @@ mod emission;
 mod facets;
 mod glass;
 mod interior;
+mod jumps;
 mod lines;
 mod modelled;
 #[cfg(test)]
@@ -99,7 +100,7 @@ pub struct VolumePath {
 }
 
 /// Cubes along the longest side of the tables of distances.
-const CLEARANCE_CELLS: u32 = 96;
+const CLEARANCE_CELLS: u32 = 128;
 /// Connections reach this many mean free paths (by the mean extinction of the channels).
 const REACH: f32 = 3.0;
 

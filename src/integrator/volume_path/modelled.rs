@@ -5,6 +5,7 @@ use super::connect::Scratch;
 use super::draws::PathSampler;
 use super::glass;
 use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
+use super::jumps::Jumps;
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
 use super::{Asked, CLEARANCE_CELLS, VolumePath, VolumePathOptions, endless, throughs};
@@ -77,7 +78,11 @@ impl VolumePath {
         // A path of many collisions that has come out by a hole would never end.
         let ends = |(i, body): (usize, Option<Interior>)| {
             let walked = modelled[i].as_ref().is_some_and(|m| m.walked);
-            body.map(|body| Interior { endless: body.endless && !walked, ..body })
+            body.map(|body| {
+                let jumps = scene.surface(body.object).medium().filter(|_| walked);
+                let jumps = jumps.and_then(|medium| Jumps::new(&medium, &body.clearance));
+                Interior { endless: body.endless && !walked, jumps, ..body }
+            })
         };
         let walked = walked.into_iter().enumerate().map(ends);
         let bodies: Vec<Option<Interior>> = walked.zip(clear).map(|(body, clear)| clear.or(body)).collect();

@@ -88,6 +88,20 @@ impl Spectrum {
         self.weight = self.weight * factor;
     }
 
+    /// Passed by an event of which a path of each channel keeps the share `kept`, and that it takes with the chance `chance`.
+    #[inline]
+    pub fn pass(&mut self, kept: Rgb, chance: Rgb) {
+        self.weight = self.weight * kept;
+        let share = self.share * chance;
+        self.share = share / share.mean();
+    }
+
+    /// The channel that is drawn.
+    #[inline]
+    pub fn hero(&self) -> usize {
+        self.hero
+    }
+
     /// a_c and p_c / mean(p) now.
     fn now(&self, medium: &Coefficients) -> (Rgb, Rgb) {
         let k = f64::from(self.collisions);

@@ -328,7 +328,7 @@ mod tests {
             let spectrum = Spectrum::new(Rgb::WHITE, draws.number());
             let mut lucky = [0.0; 2];
             let to = body.scatter(w, &mut draws);
-            if let Flight::Boundary(at, length) = body.flight(view, x, to, f32::INFINITY, &mut tally.walk)
+            if let Flight::Boundary(at, length) = body.flight(view, (x, 0.0), to, f32::INFINITY, &mut tally.walk)
                 && let Some(out) = refract(-to, -at.n_geometric, 1.0 / body.eta)
                 && let Some(hit) = view.rays.closest(&Ray::new(at.leave(out), out))
             {

@@ -103,6 +103,8 @@ impl Windows {
 /// A part of a path that waits to be walked.
 struct Waiting {
     from: (DVec3, Vec3),
+    /// Whether that is where and how it came to a collision.
+    collides: bool,
     spectrum: Spectrum,
     draws: PathSampler,
     order: u32,
@@ -138,10 +140,9 @@ impl WalkObserver for Splitting<'_> {
             let parts = worth.min(MOST_PARTS).round();
             spectrum.scale(Rgb::splat(1.0 / parts));
             for k in 1..parts as u32 {
-                let mut own = draws.fork(k.into());
-                let next = self.body.scatter(w, &mut own);
                 *self.parts += 1;
-                self.waiting.push(Waiting { from: (x, next), spectrum: *spectrum, draws: own, order: self.order });
+                let (from, draws) = ((x, w), draws.fork(k.into()));
+                self.waiting.push(Waiting { from, collides: true, spectrum: *spectrum, draws, order: self.order });
             }
             // What goes on draws other numbers than what was split off before.
             *draws = draws.fork(0);
@@ -151,6 +152,14 @@ impl WalkObserver for Splitting<'_> {
 
     fn plays_roulette(&self) -> bool {
         self.windows.is_some()
+    }
+
+    fn jumps(&self) -> bool {
+        true
+    }
+
+    fn passed(&mut self) {
+        self.order = self.order.saturating_add(1);
     }
 }
 
@@ -180,10 +189,13 @@ impl VolumePath {
     ) {
         let Some(body) = self.body(object) else { return };
         let spectrum = Spectrum::new(flux, draws.number());
-        let mut waiting = vec![Waiting { from, spectrum, draws, order: 0 }];
+        let mut waiting = vec![Waiting { from, collides: false, spectrum, draws, order: 0 }];
         let mut parts = 1;
-        while let Some(Waiting { from, mut spectrum, mut draws, order }) = waiting.pop() {
+        while let Some(Waiting { mut from, collides, mut spectrum, mut draws, order }) = waiting.pop() {
             let mut watch = Splitting { body, windows, waiting: &mut waiting, order, parts: &mut parts };
+            if collides {
+                from = body.scattered(from, &mut spectrum, &mut draws, &mut watch, &mut tally.walk);
+            }
             let exit = body.walk(view, from, &mut spectrum, &mut draws, &mut watch, &mut tally.walk);
             let order = watch.order;
             if let Some(exit) = exit {
