@@ -52,8 +52,8 @@ fn a_render_writes_what_it_says() {
     assert_eq!(lines.len(), 4);
     for (i, line) in lines.iter().enumerate() {
         assert_eq!(line["pass"], i + 1);
-        // A quarter of what is asked for: the body is walked through.
         assert_eq!(line["rays"]["camera"], (i + 1) * 40 * 30);
+        // A quarter of what is asked for: the body is walked through.
         assert_eq!(line["gather"]["samples"], (i + 1) * 125);
         assert!(line["seconds_total"].as_f64() >= line["seconds_gather"].as_f64());
         assert_eq!(line["non_finite"], 0);

@@ -24,7 +24,7 @@ const EXACT: f32 = 3.0;
 /// Half the diagonal of a cube, and a little for rounding [edges].
 const HALF: f32 = 0.867;
 /// Layers of cubes that one task looks at.
-const LAYERS: usize = 8;
+const LAYERS: usize = 16;
 
 /// Some layers of cubes.
 struct Layers<'a> {
@@ -88,6 +88,11 @@ impl Clearance {
     /// The distance that a level stands for [unit].
     pub fn distance(&self, level: u8) -> f32 {
         f32::from(level) * (0.25 * self.edge)
+    }
+
+    /// The largest distance there is [unit].
+    pub fn largest(&self) -> f32 {
+        self.distance(self.quarters.iter().copied().max().unwrap_or(0))
     }
 
     /// The largest level whose [`Self::distance`] is no more than this one [unit].

@@ -165,9 +165,9 @@ impl WalkedBody {
 
     /// Memory of facets and patches, and of what the paths of a pass bring [bytes].
     pub fn bytes(&self) -> u64 {
-        // Lists grow by doubling; each part of a path comes out twice, and is there twice while tasks are collected.
+        // Lists grow by doubling, and are there twice while tasks are collected; of the parts of a path some come out (measured).
         let facets = self.facets.count() as u64 * (2 * size_of::<Facet>() + 8 * size_of::<f32>()) as u64;
-        let emerged = 4.0 * PARTS * f64::from(self.paths) * size_of::<Emerged>() as f64;
+        let emerged = 1.5 * PARTS * f64::from(self.paths) * size_of::<Emerged>() as f64;
         facets + u64::from(self.most_patches()) * size_of::<(Patch, Sums)>() as u64 + emerged as u64
     }
 

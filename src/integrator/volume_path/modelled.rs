@@ -5,7 +5,7 @@ use super::connect::Scratch;
 use super::draws::PathSampler;
 use super::glass;
 use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
-use super::jumps::Jumps;
+use super::jumps;
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
 use super::{Asked, CLEARANCE_CELLS, VolumePath, VolumePathOptions, endless, throughs};
@@ -78,14 +78,11 @@ impl VolumePath {
         // A path of many collisions that has come out by a hole would never end.
         let ends = |(i, body): (usize, Option<Interior>)| {
             let walked = modelled[i].as_ref().is_some_and(|m| m.walked);
-            body.map(|body| {
-                let jumps = scene.surface(body.object).medium().filter(|_| walked);
-                let jumps = jumps.and_then(|medium| Jumps::new(&medium, &body.clearance));
-                Interior { endless: body.endless && !walked, jumps, ..body }
-            })
+            body.map(|body| Interior { endless: body.endless && !walked, ..body })
         };
         let walked = walked.into_iter().enumerate().map(ends);
-        let bodies: Vec<Option<Interior>> = walked.zip(clear).map(|(body, clear)| clear.or(body)).collect();
+        let mut bodies: Vec<Option<Interior>> = walked.zip(clear).map(|(body, clear)| clear.or(body)).collect();
+        jumps::give(&mut bodies, scene, |i| modelled[i].as_ref().is_some_and(|m| m.walked));
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
         Self { throughs, bodies, modelled, bounces, camera_in: glass::camera_in(scene), ..surfaces }
     }
