@@ -167,7 +167,7 @@ impl WalkedBody {
     pub fn bytes(&self) -> u64 {
         // Lists grow by doubling, and are there twice while tasks are collected; of the parts of a path some come out (measured).
         let facets = self.facets.count() as u64 * (2 * size_of::<Facet>() + 8 * size_of::<f32>()) as u64;
-        let emerged = 1.5 * PARTS * f64::from(self.paths) * size_of::<Emerged>() as f64;
+        let emerged = 1.2 * PARTS * f64::from(self.paths) * size_of::<Emerged>() as f64;
         facets + u64::from(self.most_patches()) * size_of::<(Patch, Sums)>() as u64 + emerged as u64
     }
 

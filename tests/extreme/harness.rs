@@ -144,7 +144,7 @@ pub fn shots(scene: &Scene) -> Vec<Shot> {
             all.push(subsurface_shot(scene, estimator, samples, backend));
         }
         if can_be_walked(scene) {
-            let walked = SubsurfaceOptions { shape: Shape::Walked, ..subsurface(Estimator::Cut, 2000) };
+            let walked = SubsurfaceOptions { shape: Shape::Walked, ..subsurface(Estimator::Cut, 8000) };
             all.push(shot(&Subsurface::new(scene, walked).unwrap(), scene, backend, "subsurface, walked".into()));
         }
         // Media in one another have no paths.

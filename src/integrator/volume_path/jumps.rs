@@ -4,12 +4,10 @@
 //! [`Ball`] knows for each channel. So one path is as good for all channels there, which flights of one of them are not.
 
 use super::draws::PathSampler;
-use super::interior::Interior;
 use super::spectrum::Spectrum;
 use crate::geometry::Clearance;
 use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::optics::{ANGLES, Ball, Medium};
-use crate::scene::Scene;
 use rayon::prelude::*;
 use std::f32::consts::{FRAC_PI_2, TAU};
 use std::sync::Arc;
@@ -29,25 +27,6 @@ pub struct Jumps {
     balls: Arc<Balls>,
     /// For each level of clearance how many of them fit.
     fits: Vec<u8>,
-}
-
-/// Gives those of `bodies` that `wanted` names balls of their media; bodies of one medium share them.
-pub fn give(bodies: &mut [Option<Interior>], scene: &Scene, wanted: impl Fn(usize) -> bool) {
-    let of = |(i, body): (usize, &Option<Interior>)| {
-        let body = body.as_ref().filter(|_| wanted(i))?;
-        Some((scene.surface(body.object).medium()?, body.clearance.largest()))
-    };
-    let media: Vec<Option<(Medium, f32)>> = bodies.iter().enumerate().map(of).collect();
-    let mut made: Vec<(Medium, Option<Arc<Balls>>)> = Vec::new();
-    for (body, own) in bodies.iter_mut().zip(&media) {
-        let (Some(body), Some((medium, _))) = (body, own) else { continue };
-        let known = made.iter().position(|(m, _)| m == medium).unwrap_or_else(|| {
-            let room = media.iter().flatten().filter(|(m, _)| m == medium).map(|(_, room)| *room);
-            made.push((*medium, Balls::new(medium, room.fold(0.0, f32::max)).map(Arc::new)));
-            made.len() - 1
-        });
-        body.jumps = made[known].1.clone().map(|balls| Jumps::new(balls, &body.clearance));
-    }
 }
 
 /// One ball.

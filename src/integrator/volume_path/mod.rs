@@ -101,6 +101,8 @@ pub struct VolumePath {
 
 /// Cubes along the longest side of the tables of distances.
 const CLEARANCE_CELLS: u32 = 128;
+/// Cubes that are enough for a mean free path.
+const CUBES_PER_PATH: f64 = 4.0;
 /// Connections reach this many mean free paths (by the mean extinction of the channels).
 const REACH: f32 = 3.0;
 
@@ -323,7 +325,10 @@ fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
     let (object, body) = (&scene.objects[index], scene.body(index as u32)?);
     let medium = scene.surface(body.object).medium()?;
     let clear = scene.surface(body.object).clear.as_ref();
-    let cells = if clear.is_some() { 1 } else { cells };
+    // Where a mean free path is many cubes long, fewer do.
+    let side = body.bounds.extent().max_element() * f64::from(medium.sigma_t().max());
+    let enough = (CUBES_PER_PATH * side).ceil().max(16.0);
+    let cells = if clear.is_some() { 1 } else { cells.min(enough as u32) };
     let meshes = scene.objects.iter().map(|o| &o.mesh);
     let clearance = Clearance::new(meshes, body.bounds, cells);
     let interior = match clear {

@@ -5,7 +5,7 @@ use super::connect::Scratch;
 use super::draws::PathSampler;
 use super::glass;
 use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
-use super::jumps;
+use super::jumps::{Balls, Jumps};
 use super::nesting::Entry;
 use super::spectrum::Spectrum;
 use super::{Asked, CLEARANCE_CELLS, VolumePath, VolumePathOptions, endless, throughs};
@@ -14,7 +14,7 @@ use crate::cache::{Plan, Step};
 use crate::geometry::SurfacePoint;
 use crate::integrator::{CameraRay, View};
 use crate::math::{DVec3, Rgb, Vec3, hash_combine};
-use crate::optics::{reflect, reflectance, refract, transmittance};
+use crate::optics::{Medium, reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::{PixelStream, cosine_hemisphere};
 use crate::scene::{Orders, Scene};
@@ -36,6 +36,25 @@ pub struct Modelled {
     pub walked: bool,
     /// Where light that comes over other surfaces and enters close to an exit is no part of the cache: paths step there.
     pub near: Option<Arc<Plan>>,
+}
+
+/// Gives those of `bodies` that `wanted` names balls of their media; bodies of one medium share them.
+fn give_jumps(bodies: &mut [Option<Interior>], scene: &Scene, wanted: impl Fn(usize) -> bool) {
+    let of = |(i, body): (usize, &Option<Interior>)| {
+        let body = body.as_ref().filter(|_| wanted(i))?;
+        Some((scene.surface(body.object).medium()?, body.clearance.largest()))
+    };
+    let media: Vec<Option<(Medium, f32)>> = bodies.iter().enumerate().map(of).collect();
+    let mut made: Vec<(Medium, Option<Arc<Balls>>)> = Vec::new();
+    for (body, own) in bodies.iter_mut().zip(&media) {
+        let (Some(body), Some((medium, _))) = (body, own) else { continue };
+        let known = made.iter().position(|(m, _)| m == medium).unwrap_or_else(|| {
+            let room = media.iter().flatten().filter(|(m, _)| m == medium).map(|(_, room)| *room);
+            made.push((*medium, Balls::new(medium, room.fold(0.0, f32::max)).map(Arc::new)));
+            made.len() - 1
+        });
+        body.jumps = made[known].1.clone().map(|balls| Jumps::new(balls, &body.clearance));
+    }
 }
 
 /// Ends a walk at its next collision but for so many.
@@ -82,7 +101,7 @@ impl VolumePath {
         };
         let walked = walked.into_iter().enumerate().map(ends);
         let mut bodies: Vec<Option<Interior>> = walked.zip(clear).map(|(body, clear)| clear.or(body)).collect();
-        jumps::give(&mut bodies, scene, |i| modelled[i].as_ref().is_some_and(|m| m.walked));
+        give_jumps(&mut bodies, scene, |i| modelled[i].as_ref().is_some_and(|m| m.walked));
         let throughs = throughs(scene, &surfaces.light.lights, &bodies);
         Self { throughs, bodies, modelled, bounces, camera_in: glass::camera_in(scene), ..surfaces }
     }
