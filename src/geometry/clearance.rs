@@ -1,6 +1,7 @@
 //! How far away the nearest surface is at least, from a table: a step shorter than that needs no ray.
 
 use super::Mesh;
+use super::winding::to_triangle;
 use crate::math::{Aabb, Aabb32, DVec3, Vec3};
 use rayon::prelude::*;
 
@@ -19,8 +20,10 @@ pub struct Clearance {
 
 /// Farther cubes count as this far [edges].
 const FARTHEST: f32 = 63.0;
-/// Up to here distances of centres are exact [edges]; beyond by the distance to the next cube that has a surface.
+/// Up to here distances of centres are exact, to rounding [edges]; beyond by the distance to the next cube that has a surface.
 const EXACT: f32 = 3.0;
+/// What rounding may make of a distance in edges.
+const ROUNDING: f32 = 1e-3;
 /// Half the diagonal of a cube, and a little for rounding [edges].
 const HALF: f32 = 0.867;
 /// Layers of cubes that one task looks at.
@@ -63,7 +66,7 @@ impl Clearance {
             table.spread(axis, &mut squares);
         }
         let distance = |(near, square): (&f32, &f32)| {
-            let distance = if *near <= EXACT { near - 1e-3 } else { (square.sqrt() - HALF).max(EXACT) };
+            let distance = if *near <= EXACT { near - ROUNDING } else { (square.sqrt() - HALF).max(EXACT - ROUNDING) };
             (4.0 * distance.clamp(0.0, FARTHEST)) as u8
         };
         table.quarters = near.iter().zip(&squares).map(distance).collect();
@@ -114,7 +117,7 @@ impl Clearance {
         };
         let layer = self.size[0] * self.size[1];
         let normal = (b - a).cross(c - a).normalize_or_zero();
-        let through = 0.5 * normal.abs().element_sum() + 1e-3;
+        let through = 0.5 * normal.abs().element_sum() + ROUNDING;
         for k in range(2, layers.first, layers.first + layers.near.len() / layer) {
             for j in range(1, 0, self.size[1]) {
                 for i in range(0, 0, self.size[0]) {
@@ -122,7 +125,8 @@ impl Clearance {
                     let at = (k - layers.first) * layer + j * self.size[0] + i;
                     let above = normal.dot(centre - a).abs();
                     if above < layers.near[at].min(EXACT) || above <= through {
-                        let distance = to_triangle([a - centre, b - centre, c - centre], normal);
+                        let corners = [a, b, c].map(|p| (p - centre).as_dvec3());
+                        let distance = to_triangle(corners, normal.as_dvec3()) as f32;
                         layers.near[at] = layers.near[at].min(distance);
                         if distance <= HALF && above <= through {
                             layers.squares[at] = 0.0;
@@ -159,22 +163,6 @@ impl Clearance {
             }
         }
     }
-}
-
-/// Distance of the origin to the triangle with these corners and the unit `normal`, if it has one.
-fn to_triangle([a, b, c]: [Vec3; 3], normal: Vec3) -> f32 {
-    let above = a.dot(normal);
-    let foot = normal * above;
-    let sides = [(a, b), (b, c), (c, a)];
-    if normal != Vec3::ZERO && sides.iter().all(|(a, b)| (*a - foot).cross(*b - foot).dot(normal) >= 0.0) {
-        return above.abs();
-    }
-    let to_side = |&(a, b): &(Vec3, Vec3)| {
-        let along = b - a;
-        let t = (-a.dot(along) / along.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        (a + along * t).length()
-    };
-    sides.iter().map(to_side).fold(f32::INFINITY, f32::min)
 }
 
 /// The parabolas (x - q)² + `line[q]` that are lowest somewhere, in order, and where each begins to be.

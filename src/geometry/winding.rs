@@ -146,8 +146,11 @@ fn solid_angle(face: &Face, p: DVec3) -> f64 {
 }
 
 pub(super) fn distance(face: &Face, p: DVec3) -> f64 {
-    let [a, b, c] = face.corners.map(|x| x - p);
-    let n = face.scaled_normal().normalize_or_zero();
+    to_triangle(face.corners.map(|x| x - p), face.scaled_normal().normalize_or_zero())
+}
+
+/// Distance of the origin to the triangle with these corners and the unit normal `n`, zero if it has none.
+pub(super) fn to_triangle([a, b, c]: [DVec3; 3], n: DVec3) -> f64 {
     let foot = n * a.dot(n);
     let inside = [(a, b), (b, c), (c, a)].iter().all(|(a, b)| (*a - foot).cross(*b - foot).dot(n) >= 0.0);
     if n != DVec3::ZERO && inside {

@@ -184,11 +184,6 @@ mod tests {
                 assert!((a.0 - b.0).abs() < 4.5 * error, "{i}: {a:?} {b:?}");
             }
         }
-        // The whole: what leaves by all faces.
-        for c in 0..3 {
-            let whole = |k: usize| (0..6).map(|face| found[k].0[3 * face + c][0].0).sum::<f64>();
-            println!("channel {c}: {} {}", whole(0), whole(1));
-        }
     }
 
     /// One jump, by whichever channel is drawn, brings to the sphere what leaves the ball in each: all of it, straight, and by angle.
