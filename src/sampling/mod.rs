@@ -12,4 +12,4 @@ pub use cache_stream::{CacheStream, Points};
 pub use pairs::Pairs;
 pub use stream::PixelStream;
 pub use turn::Turn;
-pub use warp::{cosine_hemisphere, disk};
+pub use warp::{cosine_hemisphere, disk, hemisphere};

@@ -2,7 +2,7 @@
 
 use super::tree::{Fields, Node};
 use super::values::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
-use super::{Dielectric, Emission, Surface, Translucent};
+use super::{Dielectric, Emission, Surface, Translucent, opaque};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
@@ -21,7 +21,7 @@ pub struct MaterialEntry {
     pub(super) without_thickness: Option<String>,
 }
 
-const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "emissive"];
+const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "plastic", "conductor", "emissive"];
 const COEFFICIENT: &str = "one number or three in 1/unit, none negative";
 const G: &str = "a number above -1 and below 1";
 const ETA: &str = "n_inside / n_outside, a number above 0";
@@ -31,16 +31,17 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
     let Some(table) = top.table("material")? else { return Ok(Vec::new()) };
     let entries = table.tables().map(|entry| {
         let (name, m) = entry?;
-        let kind = m.need("type", "\"translucent\", \"dielectric\", \"diffuse\" or \"emissive\"", Node::text)?;
+        let kind = m.need(
+            "type",
+            "\"translucent\", \"dielectric\", \"diffuse\", \"plastic\", \"conductor\" or \"emissive\"",
+            Node::text,
+        )?;
         let mut without_thickness = None;
         let surface = match kind {
             "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), &mut without_thickness)?,
-            "diffuse" => {
-                m.only("a diffuse material", &["type", "albedo"])?;
-                let expected = "one number or three from 0 to 1";
-                let albedo = m.need("albedo", expected, |n| colour(n, |v| (0.0..=1.0).contains(&v)))?;
-                Surface::diffuse(rgb(albedo))
-            }
+            "diffuse" => opaque::diffuse(&m)?,
+            "conductor" => opaque::conductor(&m)?,
+            "plastic" => opaque::plastic(&m)?,
             "emissive" => {
                 m.only("an emissive material", &["type", "radiance", "two_sided"])?;
                 let radiance = m.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0))?;
@@ -49,7 +50,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             "dielectric" => dielectric(&m, unit_in_mm.unwrap_or(1.0))?,
             "mirror" => {
-                let what = format!("{kind:?} is not built yet; there are {}", KINDS.join(", "));
+                let what = "a mirror is type = \"conductor\" with `reflectance = 1`, or with a `metal`";
                 return Err(m.error_at("type", what));
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),

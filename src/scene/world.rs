@@ -106,6 +106,11 @@ impl Surface {
         Self { bsdf: Arc::new(Lambertian { albedo }), emission: None, inside: None, clear: None }
     }
 
+    /// An opaque surface of any kind.
+    pub fn opaque(bsdf: Arc<dyn Bsdf>) -> Self {
+        Self { bsdf, emission: None, inside: None, clear: None }
+    }
+
     /// A lamp, which reflects nothing.
     pub fn emissive(emission: Emission) -> Self {
         Self { bsdf: Arc::new(Lambertian::BLACK), emission: Some(emission), inside: None, clear: None }
@@ -141,6 +146,11 @@ impl Surface {
     /// Whether it is neither a lamp nor the boundary of a body.
     pub fn is_opaque(&self) -> bool {
         self.emission.is_none() && !self.is_body()
+    }
+
+    /// Whether it is opaque, and reflects alike into all directions.
+    pub fn is_lambertian(&self) -> bool {
+        self.is_opaque() && self.bsdf.is_lambertian()
     }
 
     /// Whether it sends out any light.
