@@ -3,7 +3,7 @@
 
 mod refusals;
 
-use marmor::scene::{Scene, SceneFile};
+use marmor::scene::{Projection, Scene, SceneFile};
 use marmor::{Error, ErrorKind};
 use refusals::{damaged, failure};
 use std::path::Path;
@@ -161,8 +161,12 @@ fn overrides_replace_add_and_complain_as_themselves() {
         .with(&["method.name=direct", "object.0.material=lamp", "camera.fov = 50", "material.lamp.radiance=[1,2,3]"])
         .unwrap();
     assert_eq!(changed.method.name.unwrap().name(), "direct");
-    assert_eq!((changed.objects[0].material, changed.camera.fov), (1, 50.0));
-    assert_eq!((file.camera.fov, file.method.name), (40.0, None));
+    let fov = |file: &SceneFile| match file.camera.projection {
+        Projection::Perspective { fov, .. } => fov,
+        _ => f64::NAN,
+    };
+    assert_eq!((changed.objects[0].material, fov(&changed)), (1, 50.0));
+    assert_eq!((fov(&file), file.method.name), (40.0, None));
     assert!(changed.effective().contains("fov = 50"), "{}", changed.effective());
     assert_eq!(parse(&changed.effective()).unwrap().method, changed.method);
     for (typed, kind, fragment) in [

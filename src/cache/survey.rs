@@ -110,18 +110,24 @@ pub fn seen(view: View<'_>) -> Vec<Vec<Seen>> {
     let camera = &scene.camera;
     let [columns, rows] = camera.resolution.map(|r| r.min(CELLS));
     let [width, height] = [(0, columns), (1, rows)].map(|(a, cells)| camera.resolution[a] as f32 / cells as f32);
-    let through = |x: f32, y: f32| {
+    // Rays of one cell through one place of the lens.
+    let through = |cell: u32, x: f32, y: f32| {
         let (i, j) = (x * width, y * height);
-        camera.ray([i as u32, j as u32], [i.fract(), j.fract()])
+        camera.grid_ray([i as u32, j as u32], [i.fract(), j.fract()], cell)
     };
     let mut seen = vec![Vec::new(); scene.objects.len()];
     for cell in 0..columns * rows {
         let (x, y) = ((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5);
-        let ray = through(x, y);
+        let ray = through(cell, x, y);
         let Some(hit) = rays.closest(&ray) else { continue };
         let at = view.outwards(&hit);
-        let [right, down] = [through(x + 0.5, y), through(x, y + 0.5)].map(|r| 2.0 * (r.direction - ray.direction));
-        let distance2 = at.x.distance_squared(camera.origin) as f32;
+        let beside = [through(cell, x + 0.5, y), through(cell, x, y + 0.5)];
+        // The cell's size at distance 1, or that of parallel rays anywhere.
+        let ([right, down], distance2) = if camera.is_orthographic() {
+            (beside.map(|r| 2.0 * (r.origin - ray.origin).as_vec3()), 1.0)
+        } else {
+            (beside.map(|r| 2.0 * (r.direction - ray.direction)), at.x.distance_squared(ray.origin) as f32)
+        };
         let cos = at.n_geometric.dot(ray.direction).abs().max(0.05);
         let area = right.cross(down).length() * distance2 / cos;
         seen[hit.mesh as usize].push(Seen { x: at.x, spread2: area / std::f32::consts::TAU });
