@@ -8,10 +8,10 @@ use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
 use marmor::geometry::{Mended, load_obj, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
-use marmor::optics::{ChannelOptics, Medium};
+use marmor::optics::{ChannelOptics, HalfSpace, Medium};
 use marmor::query;
 use marmor::scene::{Emission, Geometry, Object, Scene, Surface};
-use marmor::words::{albedo, counted, percent, short};
+use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -255,9 +255,20 @@ fn describe(surface: &Surface) -> Vec<String> {
                     ChannelOptics::of(&t.medium).map(|k| albedo(k.alpha_prime)).join(", "),
                     free_path.0.map(|l| short(l.into())).join(", ")
                 ),
+                format!(
+                    "colour [{}]: what a thick body of it gives back of even light, the mirror image aside{}",
+                    colour(&t.medium).map(|v| digits(v, 3)).join(", "),
+                    if t.medium.g == 0.0 { "" } else { " (as if g were 0)" }
+                ),
             ]
         }
     }
+}
+
+/// Diffuse reflectance of a half space under even light.
+fn colour(medium: &Medium) -> [f64; 3] {
+    let half_space = HalfSpace::new(medium.eta.into());
+    ChannelOptics::of(medium).map(|k| half_space.even_reflectance(k.absorbed_prime))
 }
 
 fn object_json(scene: &Scene, object: &Object, share: f64) -> Value {
