@@ -386,5 +386,12 @@ fn looks_and_colours_are_told() {
     let own = put("colour = [0.2, 0.4, 0.8]\nmean_free_path = 0.1\neta = 1.4\n");
     assert!(own.contains("from its colour") && own.contains("colour [0.2, 0.4, 0.8]: what a thick body"), "{own}");
     assert!(put("preset = \"marble\"\n").contains("marble [JMLH01]"));
+    assert!(!said(folder.path(), "check scene.toml").contains("camera:"));
+    let lens =
+        said(folder.path(), "check scene.toml -D camera.aperture=0.5 -D camera.blades=6 -D render.filter=gaussian");
+    assert!(
+        lens.contains("camera: a lens of 6 blades 0.5 units wide, sharp 12 units along the view; a gaussian filter"),
+        "{lens}"
+    );
     assert!(put("colour = 0.5\nmean_free_path = 0.1\neta = 1.4\ng = 0.7\n").contains("(as if g were 0)"));
 }

@@ -139,3 +139,39 @@ pub fn seen(view: View<'_>) -> Vec<Vec<Seen>> {
     }
     seen
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // a scene of a test that does not load has failed
+mod tests {
+    use super::*;
+    use crate::query::{self, Backend};
+    use crate::scene::{Scene, SceneFile};
+    use std::path::Path;
+
+    fn points(keys: &str) -> Vec<Seen> {
+        let text = format!(
+            "unit = \"mm\"\n[camera]\nlook_at = [0, 0, 0]\nresolution = [32, 32]\n{keys}\n[[object]]\nshape = \"sphere\"\n\
+             centre = [0, 0, 0]\nradius = 1\nmaterial = \"wax\"\n[material.wax]\ntype = \"translucent\"\npreset = \"marble\"\n"
+        );
+        let scene = Scene::load(&SceneFile::parse(&text, Path::new("x.toml")).unwrap()).unwrap();
+        let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
+        seen(View { scene: &scene, rays: &*rays }).remove(0)
+    }
+
+    /// A view of 4 units from far away is nearly that of parallel rays, and so is one through a small lens that far off.
+    #[test]
+    fn parallel_rays_and_lenses_see_as_much_as_a_pinhole() {
+        let pinhole = points("position = [0, 0, 1000]\nfov = 0.2291828");
+        let sum = |points: &[Seen]| points.iter().map(|p| f64::from(p.spread2)).sum::<f64>();
+        assert!(pinhole.len() > 150);
+        for keys in [
+            "position = [0, 0, 9]\nprojection = \"orthographic\"\nheight = 4",
+            "position = [0, 0, 9]\nprojection = \"orthographic\"\nheight = 4\naperture = 0.01",
+            "position = [0, 0, 1000]\nfov = 0.2291828\naperture = 1",
+        ] {
+            let other = points(keys);
+            assert!(other.len().abs_diff(pinhole.len()) <= 4, "{keys}: {} of {}", other.len(), pinhole.len());
+            assert!((sum(&other) / sum(&pinhole) - 1.0).abs() < 0.05, "{keys}: {} {}", sum(&other), sum(&pinhole));
+        }
+    }
+}

@@ -10,7 +10,7 @@ use marmor::geometry::{Mended, load_obj, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
 use marmor::optics::{ChannelOptics, HalfSpace, Medium};
 use marmor::query;
-use marmor::scene::{Emission, Geometry, Object, Scene, Surface};
+use marmor::scene::{Emission, FilterName, Geometry, Object, Projection, Scene, SceneFile, Surface};
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -55,6 +55,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             "scene": scene.name,
             "unit_in_mm": scene.unit_in_mm,
             "resolution": [width, height],
+            "camera": camera(&prepared.file),
             "method": prepared.method.name(),
             "backend": rays.description(),
             "objects": objects.map(|(object, share)| object_json(scene, object, *share)).collect::<Vec<_>>(),
@@ -74,6 +75,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let unit = scene.unit_in_mm.map_or("unit not declared".into(), |mm| format!("1 unit = {mm} mm"));
     println!("{}: {unit}, {width}x{height} pixels", scene.name);
     println!("method {} on {}", prepared.method.name(), rays.description());
+    if let Some(line) = camera(&prepared.file) {
+        println!("{line}");
+    }
     if !warnings.is_empty() {
         println!("\nwarnings");
         warnings.iter().for_each(|warning| println!("  {warning}"));
@@ -110,6 +114,26 @@ pub fn run(args: Args) -> Result<ExitCode> {
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is not that of a pinhole with a box filter.
+fn camera(file: &SceneFile) -> Option<String> {
+    let mut parts = Vec::new();
+    if let Projection::Orthographic { height } = file.camera.projection {
+        parts.push(format!("parallel rays over {} units of height", short(height)));
+    }
+    if let Some(lens) = &file.camera.lens {
+        let blades = if lens.blades == 0 { String::new() } else { format!(" of {} blades", lens.blades) };
+        parts.push(format!(
+            "a lens{blades} {} units wide, sharp {} units along the view",
+            short(lens.aperture),
+            short(lens.focus)
+        ));
+    }
+    if let Some(filter) = file.render.filter.filter(|f| *f != FilterName::Box) {
+        parts.push(format!("a {} filter", filter.name()));
+    }
+    (!parts.is_empty()).then(|| format!("camera: {}", parts.join("; ")))
 }
 
 /// An object in some lines: where and how large it is, how much of the picture it fills, what it is made of.

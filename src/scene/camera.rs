@@ -22,6 +22,8 @@ pub struct Camera {
     right: Vec3,
     /// Film axis upwards, its length half the film's height, as `right`.
     up: Vec3,
+    /// Unit directions to the right and upwards.
+    axes: [Vec3; 2],
     /// Whether all rays through the lens's middle are parallel.
     parallel: bool,
     /// `None`: a pinhole.
@@ -45,9 +47,20 @@ impl Camera {
         let forward = forward.try_normalize()?;
         let right = forward.cross(up).try_normalize()?;
         let up = right.cross(forward);
+        let (axes, filter) = ([right, up], PixelFilter::default());
         let (right, up) = (right * half_width, up * half_height);
-        let filter = PixelFilter::default();
-        Some(Self { resolution, origin, filter, forward, middle: forward, right, up, parallel: false, lens: None })
+        Some(Self {
+            resolution,
+            origin,
+            filter,
+            forward,
+            middle: forward,
+            right,
+            up,
+            axes,
+            parallel: false,
+            lens: None,
+        })
     }
 
     /// The same with parallel rays; half of the width and height are now those of what is seen \[unit\].
@@ -103,7 +116,7 @@ impl Camera {
     pub fn ray_from(&self, pixel: [u32; 2], offset: [f32; 2], eye: [f32; 2]) -> Ray {
         let Some(lens) = &self.lens else { return self.ray(pixel, offset) };
         let film = self.film(pixel, offset);
-        let place = (self.right.normalize() * eye[0] + self.up.normalize() * eye[1]) * lens.radius;
+        let place = (self.axes[0] * eye[0] + self.axes[1] * eye[1]) * lens.radius;
         let (from, towards) = if self.parallel { (film, self.forward) } else { (Vec3::ZERO, film) };
         // Both meet at towards x focus, whose distance along the view is the focus: that of `towards` is 1.
         Ray::new(self.origin + (from + place).as_dvec3(), (towards - place / lens.focus).normalize())
@@ -141,11 +154,12 @@ impl Camera {
             return None;
         }
         let reach = self.filter.reach();
-        let edge = |axis: Vec3, pixels: u32| {
-            let half = if self.parallel { axis.length() * (1.0 + 2.0 * reach / pixels as f32) } else { 0.0 };
-            (axis.normalize() * (half + radius)).as_dvec3()
+        let edge = |a: usize, film: Vec3| {
+            let half =
+                if self.parallel { film.length() * (1.0 + 2.0 * reach / self.resolution[a] as f32) } else { 0.0 };
+            (self.axes[a] * (half + radius)).as_dvec3()
         };
         let middle = if self.parallel { self.origin + self.middle.as_dvec3() } else { self.origin };
-        Some([middle, edge(self.right, self.resolution[0]), edge(self.up, self.resolution[1])])
+        Some([middle, edge(0, self.right), edge(1, self.up)])
     }
 }
