@@ -59,6 +59,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             "method": prepared.method.name(),
             "backend": rays.description(),
             "objects": objects.map(|(object, share)| object_json(scene, object, *share)).collect::<Vec<_>>(),
+            "lights": scene.lights.iter().map(|l| json!({ "name": l.name, "light": l.kind.text(scene.centre) })).collect::<Vec<_>>(),
             "parts": parts,
             "validity": advice.bodies.iter().map(|t| advice.json(t)).collect::<Vec<_>>(),
             "says": advice.lines(),
@@ -93,6 +94,10 @@ pub fn run(args: Args) -> Result<ExitCode> {
     println!("\nobjects");
     for (object, share) in scene.objects.iter().zip(&advice.shares) {
         tell(scene, object, *share);
+    }
+    if !scene.lights.is_empty() {
+        println!("\nlights");
+        scene.lights.iter().for_each(|light| println!("  {}: {}", light.name, light.kind.text(scene.centre)));
     }
     for (built, title) in [(true, "built"), (false, "left out")] {
         println!("\n{title}");

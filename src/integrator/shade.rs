@@ -61,21 +61,35 @@ impl DirectLight {
     }
 
     /// What there is of lights in this scene.
-    pub fn parts(&self, _: &Scene) -> Vec<Part> {
+    pub fn parts(&self, scene: &Scene) -> Vec<Part> {
+        let (triangles, lamps) = (self.lights.triangles(), self.lights.emitters());
+        let points = self.lights.points();
         let table = if self.lights.has_emitters() {
-            let (n, t) = (self.lights.emitters(), self.lights.triangles());
-            Part::built("light table", {
-                let (t, n) = (counted(t, "emitting triangle", "emitting triangles"), counted(n, "mesh", "meshes"));
-                format!("{t} of {n}, {}", self.lights.choice_text())
-            })
+            let of = |n, one, many| (n > 0).then(|| counted(n, one, many));
+            let meshes = of(lamps - points, "mesh", "meshes")
+                .map(|n| format!("{} of {n}", counted(triangles, "emitting triangle", "emitting triangles")));
+            let all: Vec<String> = meshes.into_iter().chain(of(points, "point", "points")).collect();
+            Part::built("light table", format!("{}, {}", all.join(" and "), self.lights.choice_text()))
         } else {
-            Part::left_out("light table", "no emissive surface with area")
+            Part::left_out("light table", "no emissive surface with area, no point")
         };
         let environment = if self.lights.has_environment() {
             Part::built("environment", self.lights.environment_text())
         } else {
             Part::left_out("environment", "black")
         };
-        vec![table, environment]
+        let far: Vec<String> =
+            scene.lights.iter().filter(|l| l.kind.position().is_none()).map(|l| l.name.clone()).collect();
+        let far = (!far.is_empty())
+            .then(|| Part::built("lights far away", format!("{}, asked for by direction", far.join(", "))));
+        let no_size: Vec<String> = self.lights.of_no_size(scene).collect();
+        let mirrored = (!no_size.is_empty() && scene.bodies.iter().any(Option::is_some)).then(|| {
+            let name = format!("mirror images of {}", no_size.join(", "));
+            Part::left_out(
+                name,
+                "no size, so no path over a smooth surface meets it; a sun or an emissive sphere has them",
+            )
+        });
+        [table, environment].into_iter().chain(far).chain(mirrored).collect()
     }
 }

@@ -58,6 +58,7 @@ impl Subsurface {
         let needed = u128::from(samples) * BYTES_PER_SAMPLE;
         memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
         let lights = Lights::new(scene);
+        refuse_unmet(scene, &lights, &options)?;
         let walks = |object: u32| options.bounces > 0 && scene.exitance_by(object, options.shape) == ExitanceBy::Walks;
         let plan = |object| Ok(Plan::new(scene, &lights, object, walks(object), options)?.map(Arc::new));
         let plans: Vec<Option<Arc<Plan>>> = objects.map(plan).collect::<Result<_>>()?;
@@ -228,6 +229,17 @@ impl Subsurface {
             }
         }
     }
+}
+
+/// Refuses lights that no direction by the cosine meets, where there are no others.
+fn refuse_unmet(scene: &Scene, lights: &Lights, options: &SubsurfaceOptions) -> Result<()> {
+    let unmet = lights.of_no_size(scene).next().filter(|_| options.entry == EntrySampling::Cosine);
+    unmet.map_or(Ok(()), |name| {
+        let what = "light that enters is looked for by the cosine (`entry = \"cosine\"`, `--as-notes`)";
+        Err(Error::scene(format!(
+            "{what}, which never meets light {name:?}, for it has no size: take type = \"sun\" or an emissive sphere, or leave that out"
+        )))
+    })
 }
 
 /// That paths can walk through all translucent bodies.

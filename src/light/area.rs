@@ -1,6 +1,6 @@
 //! An emissive mesh.
 
-use super::{Cone, Light, LightBounds, LightEnd, LightSample, Reference};
+use super::{Cone, Light, LightBounds, LightEnd, LightSample, Reference, Shines};
 use crate::geometry::{AreaTable, Mesh};
 use crate::math::{Aabb, DVec3, Vec3};
 use crate::scene::{Emission, Scene};
@@ -78,7 +78,8 @@ impl Light for AreaLight {
         let sample = self.table.sample(pick, u);
         let at = scene.objects[self.object as usize].mesh.point(sample.triangle, sample.u, sample.v);
         let Emission { radiance, two_sided } = self.emission;
-        let end = LightEnd::Point { at, two_sided };
+        let shines = if two_sided { Shines::BothSides } else { Shines::Front };
+        let end = LightEnd::Point { at, shines };
         Some(LightSample {
             end,
             radiance,

@@ -2,7 +2,10 @@
 
 use super::choice::{Choice, FEW};
 use super::tree::Pick;
-use super::{AreaLight, Arrival, CountedLight, Light, LightSample, Met, Reference, Sky, Suns, emitted};
+use super::{
+    AreaLight, Arrival, CountedLight, Distant, Light, LightEnd, LightSample, Met, PointLight, Reference, Sky, Sun,
+    Suns, emitted,
+};
 use crate::geometry::SurfacePoint;
 use crate::math::{Aabb, DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
@@ -10,6 +13,7 @@ use crate::sampling::cosine_hemisphere;
 use crate::scene::{Scene, View};
 use crate::tally::LIGHTS;
 use std::f32::consts::PI;
+use std::f64::consts::PI as PI64;
 
 /// A lamp of this share of its area and that of a disk with its distance as radius: from there on the cosine has less noise
 /// than points of the lamp. For the middle of a disk, (a² + h²)² / (3 a² h²) - 1 against h² / a², the relative variances
@@ -38,8 +42,8 @@ pub enum Group {
     Near,
     /// Far away: suns.
     Far,
-    /// Those far away that no direction of a surface meets.
-    FarDelta,
+    /// Those far away that are not in the environment's picture.
+    FarBeside,
 }
 
 struct Asked {
@@ -50,8 +54,10 @@ struct Asked {
 /// What is told of some kinds of light.
 struct Facts {
     triangles: usize,
+    /// Share of the picture's light that comes from elsewhere than its suns.
+    of_picture: f32,
+    /// The same of all that comes from far away.
     beside_suns: f32,
-    solid_angle_of_suns: f32,
 }
 
 impl Lights {
@@ -64,16 +70,16 @@ impl Lights {
     pub fn with_few(scene: &Scene, few: usize) -> Self {
         let (sky, lamps) = (Sky::new(&scene.environment), AreaLight::all(scene).collect::<Vec<_>>());
         let suns = Suns::new(&sky);
-        let of_suns = |value: fn(&Suns) -> f32, none| suns.as_ref().map_or(none, value);
-        let facts = Facts {
-            triangles: lamps.iter().map(AreaLight::triangles).sum(),
-            beside_suns: of_suns(|suns| suns.beside, 1.0),
-            solid_angle_of_suns: of_suns(|suns| suns.solid_angle, 0.0),
-        };
+        let (of_picture, triangles) =
+            (suns.as_ref().map_or(1.0, |suns| suns.beside), lamps.iter().map(AreaLight::triangles).sum());
         // Each kind of light has its line here.
-        let mut lights: Vec<Box<dyn Light>> = Vec::with_capacity(lamps.len() + 1);
+        let mut lights: Vec<Box<dyn Light>> = Vec::with_capacity(lamps.len() + scene.lights.len() + 1);
         lights.extend(lamps.into_iter().map(|lamp| Box::new(lamp) as Box<dyn Light>));
         lights.extend(suns.map(|suns| Box::new(suns) as Box<dyn Light>));
+        lights.extend(scene.lights.iter().filter_map(|source| PointLight::boxed(scene, source)));
+        lights.extend(scene.lights.iter().filter_map(Sun::boxed));
+        lights.extend(scene.lights.iter().filter_map(Distant::boxed));
+        let facts = Facts { triangles, of_picture, beside_suns: beside_suns(&sky, of_picture, &lights) };
         lights.sort_by_key(|light| light.bounds().is_none());
         let mut of_object = vec![NONE; scene.objects.len()];
         for (i, light) in (0..).zip(&lights) {
@@ -85,7 +91,7 @@ impl Lights {
             Asked { lights: of, choice }
         };
         let is_far = |light: &dyn Light| light.bounds().is_none();
-        let groups = [group(&|l| !is_far(l)), group(&is_far), group(&|l| is_far(l) && l.is_delta())];
+        let groups = [group(&|l| !is_far(l)), group(&is_far), group(&|l| is_far(l) && !l.in_picture())];
         Self { lights, groups, sky, of_object, facts }
     }
 
@@ -108,6 +114,11 @@ impl Lights {
         !self.group(Group::Far).lights.is_empty()
     }
 
+    /// Whether a path that leaves the scene may meet light.
+    pub fn shine_from_afar(&self) -> bool {
+        self.has_environment() || self.group(Group::Far).lights.iter().any(|&i| !self.lights[i as usize].is_delta())
+    }
+
     /// The groups that paths ask for where they scatter: all else they find by themselves.
     pub fn asked(&self) -> impl Iterator<Item = Group> {
         self.present([Group::Near, Group::Far])
@@ -115,7 +126,7 @@ impl Lights {
 
     /// The groups that a method asks for which looks around for the environment with all that is in its picture.
     pub fn asked_beside_sky(&self) -> impl Iterator<Item = Group> {
-        self.present([Group::Near, Group::FarDelta])
+        self.present([Group::Near, Group::FarBeside])
     }
 
     fn present(&self, groups: [Group; 2]) -> impl Iterator<Item = Group> {
@@ -177,9 +188,21 @@ impl Lights {
         self.facts.beside_suns
     }
 
-    /// Solid angle [sr] of an even light as hard to meet as the suns; 0 without any.
-    pub fn solid_angle_of_suns(&self) -> f32 {
-        self.facts.solid_angle_of_suns
+    /// Those far away that rays meet, each with its solid angle \[sr\].
+    pub fn disks<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = (String, f64)> + 'a {
+        let far = self.lights.iter().filter(|light| light.bounds().is_none() && !light.is_delta());
+        far.map(|light| (light.name(scene), light.solid_angle()))
+    }
+
+    /// The names of those that no ray meets by chance.
+    pub fn of_no_size<'a>(&'a self, scene: &'a Scene) -> impl Iterator<Item = String> + 'a {
+        self.lights.iter().filter(|light| light.is_delta()).map(|light| light.name(scene))
+    }
+
+    /// How many of those at places have no surface.
+    pub fn points(&self) -> usize {
+        let near = self.group(Group::Near).lights.iter();
+        near.filter(|&&i| self.lights[i as usize].object().is_none()).count()
     }
 
     /// Mean radiance of the lights of a group, by power; 0 without any.
@@ -211,14 +234,20 @@ impl Lights {
     /// Radiance from outside the scene out of the direction of the unit vector `w`; black without an environment.
     #[inline]
     pub fn environment(&self, w: Vec3) -> Rgb {
-        let far = &self.group(Group::Far).lights;
-        far.iter().fold(self.sky.radiance(w), |sum, &i| sum + self.lights[i as usize].radiance(w))
+        self.sky.radiance(w) + self.beside_picture(w)
+    }
+
+    /// Radiance out of the direction `w` of lights that are in no picture.
+    #[inline]
+    fn beside_picture(&self, w: Vec3) -> Rgb {
+        let far = &self.group(Group::FarBeside).lights;
+        far.iter().fold(Rgb::BLACK, |sum, &i| sum + self.lights[i as usize].radiance(w))
     }
 
     /// What is said of the environment in a list of parts.
     pub fn environment_text(&self) -> String {
-        let share = 100.0 * (1.0 - self.share_beside_suns());
-        match self.facts.beside_suns < 1.0 {
+        let share = 100.0 * (1.0 - self.facts.of_picture);
+        match self.facts.of_picture < 1.0 {
             true => {
                 format!("{}; {share:.1} % of its light is from suns, which are asked for like lamps", self.sky.text())
             }
@@ -240,7 +269,17 @@ impl Lights {
         let Pick { light, chance, left } = choice.pick(from, u[0], [u[1], u[2]])?;
         let i = lights[light] as usize;
         let own = self.lights[i].sample(scene, from, left, [u[1], u[2]])?;
-        Some(LightSample { pdf: chance * own.pdf, light: self.number_in_tally(i), ..own })
+        let own = LightSample { pdf: chance * own.pdf, light: self.number_in_tally(i), ..own };
+        // Of a direction all that comes from there: what lies before one another is one light for those who meet it, too.
+        match (own.end, group) {
+            (LightEnd::Direction(w), Group::Far) if !own.is_delta => {
+                Some(LightSample { radiance: self.environment(w), pdf: self.density_far(group, w), ..own })
+            }
+            (LightEnd::Direction(w), Group::FarBeside) if !own.is_delta => {
+                Some(LightSample { radiance: self.beside_picture(w), pdf: self.density_far(group, w), ..own })
+            }
+            _ => Some(own),
+        }
     }
 
     /// Light of one of a group on a surface; `None` where it comes from behind the surface or leaves the light at its dark side.
@@ -278,12 +317,19 @@ impl Lights {
             let number = (pick as usize).min(groups - 1);
             let group = self.asked_beside_sky().nth(number)?;
             let mut arrival = self.arrival(view.scene, group, at, [pick - number as f32, u[1], u[2]])?;
+            if group == Group::FarBeside {
+                // The environment behind it, which directions around find too.
+                arrival.irradiance += self.sky.radiance(arrival.w) * (at.n.dot(arrival.w) / arrival.pdf_angle);
+            }
             arrival.irradiance *= 1.0 / (each + look_around * self.pdf_around(at, arrival.w) / arrival.pdf_angle);
             return Some((arrival, false));
         }
         let (w, shadow) = self.look_around(at, [u[1], u[2]])?;
         let hit = view.rays.closest(&shadow);
-        let by_light = hit.map_or(0.0, |hit| self.pdf_met(view.scene, &Reference::surface(at), &hit, w));
+        let by_light = match hit {
+            Some(hit) => self.pdf_met(view.scene, &Reference::surface(at), &hit, w),
+            None => self.density_far(Group::FarBeside, w) as f32,
+        };
         let Met { radiance, light } = self.met(view.scene, hit.as_ref(), w);
         let pdf_angle = look_around * self.pdf_around(at, w) + each * by_light;
         let irradiance = radiance * (at.n.dot(w) / pdf_angle);
@@ -309,10 +355,14 @@ impl Lights {
     /// Density [1/sr] of `w` by [`Self::sample`] of what is far; 0 where nothing is.
     #[inline]
     pub fn pdf_far(&self, w: Vec3) -> f32 {
-        let Asked { lights, choice } = self.group(Group::Far);
-        let from = Reference { x: DVec3::ZERO, n: None, reach: 0.0 };
+        self.density_far(Group::Far, w) as f32
+    }
+
+    fn density_far(&self, group: Group, w: Vec3) -> f64 {
+        let Asked { lights, choice } = self.group(group);
+        let from = Reference::place(DVec3::ZERO);
         let pdf = |(k, &i): (usize, &u32)| choice.share(k) * self.lights[i as usize].pdf(&from, w);
-        lights.iter().enumerate().map(pdf).sum::<f64>() as f32
+        lights.iter().enumerate().map(pdf).sum::<f64>()
     }
 
     /// Whether the object number `object` is a light.
@@ -372,6 +422,13 @@ impl Lights {
     pub fn pdf_around(&self, at: &SurfacePoint, w: Vec3) -> f32 {
         self.sky.density(at.n, w)
     }
+}
+
+/// Share of the light from far away that comes from no sun, of the picture or beside it.
+fn beside_suns(sky: &Sky, of_picture: f32, lights: &[Box<dyn Light>]) -> f32 {
+    let far = lights.iter().filter(|light| light.bounds().is_none() && !light.in_picture());
+    let (all, beside) = (4.0 * PI64 * f64::from(sky.mean_radiance()), far.map(|light| light.power()).sum::<f64>());
+    if beside > 0.0 { (f64::from(of_picture) * all / (all + beside)) as f32 } else { of_picture }
 }
 
 fn looking(at: &SurfacePoint, w: Vec3) -> Option<(Vec3, Ray)> {

@@ -1,13 +1,16 @@
 //! Light arriving at a surface point or at a collision, before anything stands in its way.
 //! Not for: what the surface does with it (`integrator`, `cache`). Read first: [`Lights`], which is what callers ask; then
-//! [`Light`], one kind of light and one file each: `area.rs`, `suns.rs`, `sky.rs`.
+//! [`Light`], one kind of light and one file each: `area.rs`, `point.rs`, `distant.rs`, `sun.rs`, `suns.rs` of a picture, `sky.rs`.
 
 mod area;
 mod bounds;
 mod choice;
+mod distant;
 mod lights;
 mod picture;
+mod point;
 mod sky;
+mod sun;
 mod suns;
 mod tree;
 
@@ -18,8 +21,11 @@ use crate::scene::{Emission, Scene};
 pub use area::AreaLight;
 pub use bounds::{Cone, LightBounds};
 pub use choice::Choice;
+pub use distant::Distant;
 pub use lights::{Group, Lights};
+pub use point::PointLight;
 pub use sky::Sky;
+pub use sun::Sun;
 pub use suns::Suns;
 pub use tree::Pick;
 
@@ -46,6 +52,16 @@ pub trait Light: Send + Sync {
     /// Area of its surface \[unit²\]; 0 without one.
     fn area(&self) -> f64 {
         0.0
+    }
+
+    /// Solid angle that a light far away fills, by an even light with the same power and mean square \[sr\]; 0 of a single direction.
+    fn solid_angle(&self) -> f64 {
+        0.0
+    }
+
+    /// Whether what it sends is part of the environment's picture.
+    fn in_picture(&self) -> bool {
+        false
     }
 
     /// Whether it is a single place or direction: no ray meets it by chance.
@@ -124,28 +140,45 @@ pub struct LightSample {
 /// Where light comes from.
 #[derive(Clone, Copy, Debug)]
 pub enum LightEnd {
-    /// A point of a surface; it shines to where its normal looks, or to both sides.
+    /// A point of a surface, or a place without one; its geometric normal is the axis of what it sends.
     Point {
         /// The point.
         at: SurfacePoint,
-        /// Whether it shines to both sides.
-        two_sided: bool,
+        /// Where to.
+        shines: Shines,
     },
     /// A unit direction, far away.
     Direction(Vec3),
 }
 
+/// Into which directions a point shines.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shines {
+    /// Evenly as a surface does, to where its normal looks.
+    Front,
+    /// The same, to both sides.
+    BothSides,
+    /// Into all, without a surface.
+    Everywhere,
+    /// Into a cone around the axis, without a surface: cosines of the angles where it begins to fade and where it is dark.
+    Cone([f32; 2]),
+}
+
 impl LightSample {
-    /// Cosine at the light for what is seen along the unit vector `w`, from there to the light; not above 0 where it is dark,
-    /// 1 of what has no area.
+    /// Cosine at the light for what is seen along the unit vector `w`, from there to the light; not above 0 where it is dark.
+    /// Of what has no area, the share of its intensity.
     #[inline]
     pub fn cosine(&self, w: Vec3) -> f32 {
-        match self.end {
-            LightEnd::Point { at, two_sided } if !self.is_delta => {
-                let cosine = -at.n_geometric.dot(w);
-                if two_sided { cosine.abs() } else { cosine }
+        let LightEnd::Point { at, shines } = self.end else { return 1.0 };
+        let cosine = -at.n_geometric.dot(w);
+        match shines {
+            Shines::Front => cosine,
+            Shines::BothSides => cosine.abs(),
+            Shines::Everywhere => 1.0,
+            Shines::Cone([from, to]) => {
+                let rise = ((cosine - to) / (from - to)).clamp(0.0, 1.0);
+                rise * rise * (3.0 - 2.0 * rise)
             }
-            _ => 1.0,
         }
     }
 

@@ -107,6 +107,14 @@ impl Light for Suns {
         None
     }
 
+    fn solid_angle(&self) -> f64 {
+        self.solid_angle.into()
+    }
+
+    fn in_picture(&self) -> bool {
+        true
+    }
+
     fn sample(&self, _: &Scene, _: &Reference, pick: f64, u: [f32; 2]) -> Option<LightSample> {
         let w = self.direction(pick, u);
         // A direction within rounding of its patch's edge may be found in the next.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::camera_entry::{self, CameraEntry};
 use super::environment::{self, EnvironmentEntry};
+use super::lights::{self, LightSource};
 use super::materials::{self, MaterialEntry};
 use super::objects::{self, ObjectEntry};
 use super::options::{FilterName, MethodOptions, RenderOptions};
@@ -29,6 +30,8 @@ pub struct SceneFile {
     pub materials: Vec<MaterialEntry>,
     /// `[environment]`; black without one.
     pub environment: EnvironmentEntry,
+    /// `[[light]]`, in order: lights that are no surface.
+    pub lights: Vec<LightSource>,
     /// `[method]`.
     pub method: MethodOptions,
     /// `[render]`.
@@ -39,7 +42,7 @@ pub struct SceneFile {
 /// Memory for each byte of a scene file while it is parsed; measured with 100 000 objects.
 const BYTES_PER_BYTE: u128 = 100;
 
-const SECTIONS: &[&str] = &["unit", "camera", "object", "material", "environment", "method", "render"];
+const SECTIONS: &[&str] = &["unit", "camera", "object", "material", "light", "environment", "method", "render"];
 
 impl SceneFile {
     /// Reads and checks a scene file; meshes are not opened yet.
@@ -134,6 +137,7 @@ impl SceneFile {
             camera: camera_entry::read(&top)?,
             objects: objects::read(&top, &materials)?,
             environment: environment::read(&top)?,
+            lights: lights::read(&top, unit_in_mm)?,
             method: method(&top)?,
             render: render(&top)?,
             materials,

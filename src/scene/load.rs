@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use super::file::SceneFile;
 use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
-use super::{Insides, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets, warnings};
+use super::{
+    Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets, warnings,
+};
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, examine, load_obj, mended, rectangle, sphere,
+    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, Solid, examine, load_obj, mended, rectangle, sphere,
 };
 use crate::math::{Aabb, DVec3};
 use crate::memory;
@@ -66,6 +68,7 @@ impl Scene {
             objects.push(Object { name, parts, mesh, at, material, flipped, findings, priority, sheet });
         }
         let bodies = Self::bodies_of(&objects, &materials);
+        let placed_light = |light: &LightSource| LightSource { kind: light.kind.relative_to(centre), ..light.clone() };
         let mut scene = Self {
             name: file.path.display().to_string(),
             unit_in_mm: file.unit_in_mm,
@@ -75,10 +78,12 @@ impl Scene {
             bodies,
             materials,
             environment,
+            lights: file.lights.iter().map(placed_light).collect(),
             why_double: None,
             warnings: Vec::new(),
             insides: Insides::default(),
         };
+        lights_outside(&scene)?;
         let traced = file.method.name == Some(MethodName::VolumePath);
         let single = file.method.single != Some(false);
         let walks = |t: &Translucent| traced || single && warnings::no_first_order(t).is_some();
@@ -120,7 +125,7 @@ impl Scene {
             MethodName::Subsurface
         } else if any(Surface::is_body) {
             MethodName::VolumePath
-        } else if !self.environment.is_black() || any(|s| s.emission.is_some()) {
+        } else if !self.environment.is_black() || !self.lights.is_empty() || any(|s| s.emission.is_some()) {
             MethodName::Path
         } else {
             MethodName::AmbientOcclusion
@@ -131,6 +136,28 @@ impl Scene {
     pub fn meshes(&self) -> Vec<&Mesh> {
         self.objects.iter().map(|o| &o.mesh).collect()
     }
+}
+
+/// Refuses a light at a place inside a body: light reaches a body's medium from lamps with a surface, and through the body's boundary.
+fn lights_outside(scene: &Scene) -> Result<()> {
+    for light in &scene.lights {
+        let Some(x) = light.kind.position() else { continue };
+        if !x.as_vec3().is_finite() {
+            let what = "is too far out for single precision; use a larger `unit`, or type = \"distant\"";
+            return Err(Error::scene(format!("{}: light {:?} {what}", light.at, light.name)));
+        }
+        for (object, body) in scene.objects.iter().zip(&scene.bodies) {
+            let near = body.as_ref().is_some_and(|body| body.bounds.contains(x));
+            if near && Solid::new(&object.mesh).winding(x, |_| true).is_some_and(|w| w != 0) {
+                return Err(Error::scene(format!(
+                    "{}: light {:?} is inside object {:?}: a place without a surface is met by no path there; move it out, or take an \
+                     emissive sphere",
+                    light.at, light.name, object.name
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The mesh of a body of several objects, or of one.

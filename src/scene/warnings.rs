@@ -144,7 +144,7 @@ fn thin(t: &Translucent, diagonal: f64) -> Option<String> {
 fn light(file: &SceneFile, scene: &Scene, said: &mut Vec<String>) {
     if scene.is_dark() && file.method.name != Some(MethodName::AmbientOcclusion) {
         said.push(format!(
-            "{}: no light: no emissive object and no [environment]; all but ambient occlusion will be black",
+            "{}: no light: no emissive object, no [[light]] and no [environment]; all but ambient occlusion will be black",
             file.path.display()
         ));
     }

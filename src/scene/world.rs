@@ -1,6 +1,6 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
-use super::{Body, Camera, Environment, Insides, ObstacleKind};
+use super::{Body, Camera, Environment, Insides, LightSource, ObstacleKind};
 use crate::bssrdf::{Bssrdf, ModelName, ModelOption, ModelOptions, choose};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
@@ -28,6 +28,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Light from every direction that meets no surface; black without one.
     pub environment: Environment,
+    /// Lights that are no surface.
+    pub lights: Vec<LightSource>,
     /// Why rays are traced in f64, where they are: the object that f32 cannot hold, with its numbers.
     pub why_double: Option<String>,
     /// Oddities a user should hear of, in order of the file.
@@ -185,10 +187,11 @@ impl Scene {
         self.objects.iter().any(|o| self.materials[o.material].surface.clear.is_some())
     }
 
-    /// Whether nothing sends out light: no emissive object, no environment.
+    /// Whether nothing sends out light: no emissive object, no other light, no environment.
     pub fn is_dark(&self) -> bool {
         let shines = |o: &Object| self.materials[o.material].surface.shines();
-        self.environment.is_black() && !self.objects.iter().any(shines)
+        let lit = self.lights.iter().any(|light| !light.kind.amount().is_black());
+        self.environment.is_black() && !lit && !self.objects.iter().any(shines)
     }
 
     /// The body behind the surface of an object.

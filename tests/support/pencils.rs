@@ -109,6 +109,7 @@ impl Body {
             objects,
             materials,
             environment: Rgb::BLACK.into(),
+            lights: Vec::new(),
             why_double: None,
             warnings: Vec::new(),
             insides: Insides::default(),

@@ -5,6 +5,7 @@ use crate::scene::{Body, Object, Scene, Surface};
 use crate::words::first_of;
 use std::collections::HashSet;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A body is clear where more than exp(-3) = 5 % of the light in some channel goes straight through its thickness.
 const CLEAR: f64 = 3.0;
@@ -26,16 +27,17 @@ pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -
             kept[list].push(name);
         }
     };
-    let sun = lights.has_suns()
-        && f64::from(lights.solid_angle_of_suns()) < SMALL * PI
-        && lights.share_beside_suns() < 1.0 - SUNNY;
+    // Those that no ray meets are in `never_met`.
+    let small = lights.disks(scene).filter(|(_, solid_angle)| *solid_angle < SMALL * PI);
+    let suns: Vec<String> = small.map(|(name, _)| name).collect();
+    let sunny = lights.share_beside_suns() < 1.0 - SUNNY;
     for (i, body) in scene.bodies.iter().enumerate() {
         let (Some(body), name) = (body.as_ref().filter(|_| passes(i)), &scene.objects[i].name) else { continue };
         if !is_clear(scene, body) || !scene.objects.iter().enumerate().any(|(j, o)| i != j && receives(scene, o)) {
             continue;
         }
-        if sun {
-            keep(0, "the bright part of the environment's picture");
+        for sun in suns.iter().filter(|_| sunny) {
+            keep(0, sun);
             keep(1, name);
         }
         for lamp in scene.objects.iter().filter(|lamp| is_small(scene, lamp, body)) {
@@ -49,6 +51,23 @@ pub fn warning(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -
             "light of {from} that comes through {through} to diffuse surfaces or other bodies is met by chance alone, so seldom that \
              it may be missing from the picture and from the error that is told: no shadow ray passes through a body; take larger \
              or softer lights, many more samples, or leave the clear body out"
+        )
+    })
+}
+
+/// That paths through clear bodies never meet a light without size; `None` where there is none.
+pub fn never_met(scene: &Scene, lights: &Lights, passes: impl Fn(usize) -> bool) -> Option<String> {
+    let from: Vec<String> = lights.of_no_size(scene).map(|name| format!("{name:?}")).collect();
+    let clear = |(i, body): (usize, &Option<Arc<Body>>)| {
+        let body = body.as_ref().filter(|body| passes(i) && is_clear(scene, body))?;
+        Some(format!("{:?}", scene.objects[body.object as usize].name))
+    };
+    let through: Vec<String> = scene.bodies.iter().enumerate().filter_map(clear).collect();
+    let (from, through) = (first_of(&from, MOST_NAMES), first_of(&through, MOST_NAMES));
+    (!from.is_empty() && !through.is_empty()).then(|| {
+        format!(
+            "light of {from}, which has no size, is not in the picture where {through} refracts it to another surface, or mirrors it inside \
+             before it is scattered: no path meets it; give it one (type = \"sun\", or an emissive sphere)"
         )
     })
 }

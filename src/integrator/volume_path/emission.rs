@@ -3,7 +3,7 @@
 use super::interior::Interior;
 use crate::geometry::{AreaTable, SurfacePoint};
 use crate::integrator::View;
-use crate::light::{Arrival, Group, LightEnd, Lights, Reference, emitted};
+use crate::light::{Arrival, Group, LightEnd, Lights, Reference, Shines, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::optics::transmittance;
 use crate::query::Ray;
@@ -109,11 +109,11 @@ impl EmissionSampler {
             Some(Entering { at, w, flux, light: lights.number(hit.mesh), shadow: None, by })
         } else {
             let drawn = lights.sample(view.scene, Group::Near, &self.around, [pick as f32, u[0], u[1]])?;
-            let (LightEnd::Point { at: lamp, two_sided }, Some(object)) = (drawn.end, drawn.object) else {
+            let (LightEnd::Point { at: lamp, shines }, Some(object)) = (drawn.end, drawn.object) else {
                 return None;
             };
             let side = (pick_way - self.ways[0] - self.ways[1]) / self.ways[2];
-            let n = if two_sided && side >= 0.5 { -lamp.n_geometric } else { lamp.n_geometric };
+            let n = if shines == Shines::BothSides && side >= 0.5 { -lamp.n_geometric } else { lamp.n_geometric };
             let out = cosine_hemisphere(n, [u[3], u[4]]);
             tally.rays.bounce += 1;
             let hit = view.rays.closest(&Ray::new(lamp.leave(out), out)).filter(|hit| hit.mesh == body.object)?;

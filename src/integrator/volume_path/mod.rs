@@ -187,7 +187,8 @@ impl VolumePath {
         // Behind a stand-in is nothing.
         let matched = |object: usize| self.bodies[object].as_ref().is_some_and(|body| body.matched);
         let passes = |object: usize| self.stand_ins[object].is_none() && !matched(object);
-        clear::warning(scene, &self.light.lights, passes).into_iter().collect()
+        let lights = &self.light.lights;
+        [clear::warning(scene, lights, passes), clear::never_met(scene, lights, passes)].into_iter().flatten().collect()
     }
 
     /// What the camera sees at `hit`, but for what is asked of models, which is added to `scratch`.
@@ -312,7 +313,7 @@ impl VolumePath {
     /// Whether a path of [`Self::once`] can find no more light once lamps have been asked for.
     fn points_are_all(&self, body: &Interior) -> bool {
         let lamps = || self.through(body).is_some_and(|t| t.all_alone);
-        self.once && !self.light.lights.has_environment() && lamps()
+        self.once && !self.light.lights.shine_from_afar() && lamps()
     }
 
     fn of_order_0(&self, light: Rgb) -> Rgb {
