@@ -18,7 +18,8 @@
 //! ```
 //!
 //! **The medium of a colour.** [`optics::AlbedoCurve`] finds the coefficients whose half space has a wanted diffuse
-//! reflectance, at a transport mean free path of your choice.
+//! reflectance by a model, at a transport mean free path of your choice; [`optics::Look`] those that transport itself gives that
+//! colour.
 //!
 //! ```
 //! use marmor::bssrdf::{Bssrdf as _, StandardDipole};

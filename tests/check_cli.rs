@@ -370,3 +370,28 @@ fn check_tells_where_objects_are_how_large_and_how_much_of_the_picture_they_fill
     assert!(odd.contains("4 units is 40000 transport mean free paths: light hardly spreads on it"), "{odd}");
     assert!(!all.contains("hardly spreads"));
 }
+
+#[test]
+fn looks_and_colours_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |medium: &str| {
+        let own = "sigma_s_prime = 1.998\nsigma_a = 0.002\neta = 1.3\n";
+        let text = scene(&ball("body", 0.0, 2.0, "wax", "")).replacen(own, medium, 1);
+        assert!(text.contains(medium));
+        fs::write(folder.path().join("scene.toml"), text).unwrap();
+        said(folder.path(), "check scene.toml")
+    };
+    let jade = put("preset = \"jade\"\n");
+    assert!(jade.contains("jade (a look, not measured)") && jade.contains("colour [0.3, 0.55, 0.36]"), "{jade}");
+    let own = put("colour = [0.2, 0.4, 0.8]\nmean_free_path = 0.1\neta = 1.4\n");
+    assert!(own.contains("from its colour") && own.contains("colour [0.2, 0.4, 0.8]: what a thick body"), "{own}");
+    assert!(put("preset = \"marble\"\n").contains("marble [JMLH01]"));
+    assert!(!said(folder.path(), "check scene.toml").contains("camera:"));
+    let lens =
+        said(folder.path(), "check scene.toml -D camera.aperture=0.5 -D camera.blades=6 -D render.filter=gaussian");
+    assert!(
+        lens.contains("camera: a lens of 6 blades 0.5 units wide, sharp 12 units along the view; a gaussian filter"),
+        "{lens}"
+    );
+    assert!(put("colour = 0.5\nmean_free_path = 0.1\neta = 1.4\ng = 0.7\n").contains("(as if g were 0)"));
+}

@@ -3,7 +3,7 @@
 
 mod refusals;
 
-use marmor::scene::{Scene, SceneFile};
+use marmor::scene::{Projection, Scene, SceneFile};
 use marmor::{Error, ErrorKind};
 use refusals::{damaged, failure};
 use std::path::Path;
@@ -105,6 +105,16 @@ const MALFORMED: &[(&str, &str, u32, &[&str])] = &[
     ("sigma_s_prime = [2, 3, 4]", "sigma_s_prime = 3\nsigma_s = 3", 23, &["remove one"]),
     ("sigma_s_prime = [2, 3, 4]", "preset = \"marbel\"", 22, &["did you mean `marble`?"]),
     ("sigma_s_prime = [2, 3, 4]", "preset = \"marble\"", 23, &["`material.stone.sigma_a` stands beside `preset`"]),
+    ("sigma_s_prime = [2, 3, 4]", "preset = \"milk\"", 22, &["`material.stone.preset`", "`skimmilk`, `wholemilk`"]),
+    ("sigma_s_prime = [2, 3, 4]", "colour = 0.5", 23, &["`material.stone.sigma_a` stands beside `colour`"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "colour = 0.5", 20, &["`material.stone.mean_free_path` is missing", "above 0"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "mean_free_path = 2", 20, &["`material.stone.colour` is missing"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "colour = [0.5, 1, 0]\nmean_free_path = 2", 22, &["[0.5, 1, 0]", "below 1", "`sigma_a` = 0"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "colour = 0.5\nmean_free_path = [1, 0, 1]", 23, &["`material.stone.mean_free_path` is [1, 0, 1]"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "colour = 0.5\nmean_free_path = 1e-20", 20, &["coefficients lie in", "`mean_free_path`"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01\neta = 1.5", "colour = 0.5\nmean_free_path = 1", 20, &["`material.stone.eta` is missing"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "preset = \"jade\"\ncolour = 0.5", 23, &["`material.stone.colour` stands beside `preset`"]),
+    ("sigma_s_prime = [2, 3, 4]\nsigma_a = 0.01", "preset = \"jdae\"", 22, &["did you mean `jade`?"]),
     ("sigma_a = 0.01", "", 20, &["`material.stone.sigma_a` is missing"]),
     ("sigma_a = 0.01", "sigma_a = 0.01\nmodel = \"dirctional\"", 24, &["`material.stone.model`", "dirctional"]),
     ("sigma_a = 0.01", "sigma_a = 0.01\nper = \"parsec\"", 24, &["parsec"]),
@@ -161,8 +171,12 @@ fn overrides_replace_add_and_complain_as_themselves() {
         .with(&["method.name=direct", "object.0.material=lamp", "camera.fov = 50", "material.lamp.radiance=[1,2,3]"])
         .unwrap();
     assert_eq!(changed.method.name.unwrap().name(), "direct");
-    assert_eq!((changed.objects[0].material, changed.camera.fov), (1, 50.0));
-    assert_eq!((file.camera.fov, file.method.name), (40.0, None));
+    let fov = |file: &SceneFile| match file.camera.projection {
+        Projection::Perspective { fov, .. } => fov,
+        _ => f64::NAN,
+    };
+    assert_eq!((changed.objects[0].material, fov(&changed)), (1, 50.0));
+    assert_eq!((fov(&file), file.method.name), (40.0, None));
     assert!(changed.effective().contains("fov = 50"), "{}", changed.effective());
     assert_eq!(parse(&changed.effective()).unwrap().method, changed.method);
     for (typed, kind, fragment) in [

@@ -313,8 +313,8 @@ fn materials_lists_every_row_and_its_doubts() {
     assert!(row("ketchup").contains("trace paths (gb)"));
     assert!(table.lines().all(|line| line.chars().count() <= 100), "{table}");
     let json: serde_json::Value = serde_json::from_str(&stdout(&marmor(&["materials", "--json"], ""))).unwrap();
-    let rows = json.as_array().unwrap();
-    assert_eq!(rows.len(), 47);
+    let (looks, rows): (Vec<_>, Vec<_>) = json.as_array().unwrap().iter().partition(|r| r["look"] == true);
+    assert_eq!((rows.len(), looks.len()), (47, 7));
     let milk = rows.iter().find(|r| r["name"] == "lowfat_milk").unwrap();
     assert_eq!(milk["as_printed"]["volume_ml_in_23_litres"], 16.0);
     assert_eq!(milk["source"], "NGD06");
@@ -326,4 +326,24 @@ fn materials_lists_every_row_and_its_doubts() {
     assert!(one.contains("16 ml in 23 litres") && one.contains("[NGD06]"), "{one}");
     let unknown = marmor(&["materials", "lowfat mlik"], "");
     assert_eq!(unknown.status.code(), Some(2));
+}
+
+#[test]
+fn looks_are_told_from_what_was_measured() {
+    let table = stdout(&marmor(&["materials"], ""));
+    let (measured, looks) = table.split_once("[looks] made up, not measured").unwrap();
+    for name in ["jade", "wax", "soap", "candle", "grape", "leaf", "milk_glass"] {
+        let starts = |text: &str| text.lines().any(|line| line.starts_with(&format!("{name} ")));
+        assert!(starts(looks) && !starts(measured), "{name}");
+        let one = stdout(&marmor(&["materials", name], ""));
+        assert!(one.starts_with(&format!("{name}: a look, not measured")), "{one}");
+    }
+    let milk = marmor(&["materials", "milk"], "");
+    assert_eq!(milk.status.code(), Some(2));
+    assert!(stderr(&milk).contains("did you mean `skimmilk`, `wholemilk`"), "{}", stderr(&milk));
+    let plot = marmor(&["profile", "--material", "jade"], "");
+    assert!(stderr(&plot).contains("`jade` is a look"), "{}", stderr(&plot));
+    let json: serde_json::Value = serde_json::from_str(&stdout(&marmor(&["materials", "jade", "--json"], ""))).unwrap();
+    let sum = |c: usize| ["sigma_s_prime_per_mm", "sigma_a_per_mm"].map(|key| json[0][key][c].as_f64().unwrap());
+    assert!((sum(0).iter().sum::<f64>() * 0.8 - 1.0).abs() < 1e-6, "{json}");
 }

@@ -110,18 +110,24 @@ pub fn seen(view: View<'_>) -> Vec<Vec<Seen>> {
     let camera = &scene.camera;
     let [columns, rows] = camera.resolution.map(|r| r.min(CELLS));
     let [width, height] = [(0, columns), (1, rows)].map(|(a, cells)| camera.resolution[a] as f32 / cells as f32);
-    let through = |x: f32, y: f32| {
+    // Rays of one cell through one place of the lens.
+    let through = |cell: u32, x: f32, y: f32| {
         let (i, j) = (x * width, y * height);
-        camera.ray([i as u32, j as u32], [i.fract(), j.fract()])
+        camera.grid_ray([i as u32, j as u32], [i.fract(), j.fract()], cell)
     };
     let mut seen = vec![Vec::new(); scene.objects.len()];
     for cell in 0..columns * rows {
         let (x, y) = ((cell % columns) as f32 + 0.5, (cell / columns) as f32 + 0.5);
-        let ray = through(x, y);
+        let ray = through(cell, x, y);
         let Some(hit) = rays.closest(&ray) else { continue };
         let at = view.outwards(&hit);
-        let [right, down] = [through(x + 0.5, y), through(x, y + 0.5)].map(|r| 2.0 * (r.direction - ray.direction));
-        let distance2 = at.x.distance_squared(camera.origin) as f32;
+        let beside = [through(cell, x + 0.5, y), through(cell, x, y + 0.5)];
+        // The cell's size at distance 1, or that of parallel rays anywhere.
+        let ([right, down], distance2) = if camera.is_orthographic() {
+            (beside.map(|r| 2.0 * (r.origin - ray.origin).as_vec3()), 1.0)
+        } else {
+            (beside.map(|r| 2.0 * (r.direction - ray.direction)), at.x.distance_squared(ray.origin) as f32)
+        };
         let cos = at.n_geometric.dot(ray.direction).abs().max(0.05);
         let area = right.cross(down).length() * distance2 / cos;
         seen[hit.mesh as usize].push(Seen { x: at.x, spread2: area / std::f32::consts::TAU });
@@ -132,4 +138,40 @@ pub fn seen(view: View<'_>) -> Vec<Vec<Seen>> {
         *points = points.iter().step_by(step).map(|s| Seen { spread2: s.spread2 * step as f32, ..*s }).collect();
     }
     seen
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used)] // a scene of a test that does not load has failed
+mod tests {
+    use super::*;
+    use crate::query::{self, Backend};
+    use crate::scene::{Scene, SceneFile};
+    use std::path::Path;
+
+    fn points(keys: &str) -> Vec<Seen> {
+        let text = format!(
+            "unit = \"mm\"\n[camera]\nlook_at = [0, 0, 0]\nresolution = [32, 32]\n{keys}\n[[object]]\nshape = \"sphere\"\n\
+             centre = [0, 0, 0]\nradius = 1\nmaterial = \"wax\"\n[material.wax]\ntype = \"translucent\"\npreset = \"marble\"\n"
+        );
+        let scene = Scene::load(&SceneFile::parse(&text, Path::new("x.toml")).unwrap()).unwrap();
+        let rays = query::build(Backend::preferred(), &scene.meshes()).unwrap();
+        seen(View { scene: &scene, rays: &*rays }).remove(0)
+    }
+
+    /// A view of 4 units from far away is nearly that of parallel rays, and so is one through a small lens that far off.
+    #[test]
+    fn parallel_rays_and_lenses_see_as_much_as_a_pinhole() {
+        let pinhole = points("position = [0, 0, 1000]\nfov = 0.2291828");
+        let sum = |points: &[Seen]| points.iter().map(|p| f64::from(p.spread2)).sum::<f64>();
+        assert!(pinhole.len() > 150);
+        for keys in [
+            "position = [0, 0, 9]\nprojection = \"orthographic\"\nheight = 4",
+            "position = [0, 0, 9]\nprojection = \"orthographic\"\nheight = 4\naperture = 0.01",
+            "position = [0, 0, 1000]\nfov = 0.2291828\naperture = 1",
+        ] {
+            let other = points(keys);
+            assert!(other.len().abs_diff(pinhole.len()) <= 4, "{keys}: {} of {}", other.len(), pinhole.len());
+            assert!((sum(&other) / sum(&pinhole) - 1.0).abs() < 0.05, "{keys}: {} {}", sum(&other), sum(&pinhole));
+        }
+    }
 }

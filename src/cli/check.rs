@@ -8,10 +8,10 @@ use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
 use marmor::geometry::{Mended, load_obj, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
-use marmor::optics::{ChannelOptics, Medium};
+use marmor::optics::{ChannelOptics, HalfSpace, Medium};
 use marmor::query;
-use marmor::scene::{Emission, Geometry, Object, Scene, Surface};
-use marmor::words::{albedo, counted, percent, short};
+use marmor::scene::{Emission, FilterName, Geometry, Object, Projection, Scene, SceneFile, Surface};
+use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -55,6 +55,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
             "scene": scene.name,
             "unit_in_mm": scene.unit_in_mm,
             "resolution": [width, height],
+            "camera": camera(&prepared.file),
             "method": prepared.method.name(),
             "backend": rays.description(),
             "objects": objects.map(|(object, share)| object_json(scene, object, *share)).collect::<Vec<_>>(),
@@ -75,6 +76,9 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let unit = scene.unit_in_mm.map_or("unit not declared".into(), |mm| format!("1 unit = {mm} mm"));
     println!("{}: {unit}, {width}x{height} pixels", scene.name);
     println!("method {} on {}", prepared.method.name(), rays.description());
+    if let Some(line) = camera(&prepared.file) {
+        println!("{line}");
+    }
     if !warnings.is_empty() {
         println!("\nwarnings");
         warnings.iter().for_each(|warning| println!("  {warning}"));
@@ -115,6 +119,26 @@ pub fn run(args: Args) -> Result<ExitCode> {
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );
     Ok(ExitCode::SUCCESS)
+}
+
+/// What is not that of a pinhole with a box filter.
+fn camera(file: &SceneFile) -> Option<String> {
+    let mut parts = Vec::new();
+    if let Projection::Orthographic { height } = file.camera.projection {
+        parts.push(format!("parallel rays over {} units of height", short(height)));
+    }
+    if let Some(lens) = &file.camera.lens {
+        let blades = if lens.blades == 0 { String::new() } else { format!(" of {} blades", lens.blades) };
+        parts.push(format!(
+            "a lens{blades} {} units wide, sharp {} units along the view",
+            short(lens.aperture),
+            short(lens.focus)
+        ));
+    }
+    if let Some(filter) = file.render.filter.filter(|f| *f != FilterName::Box) {
+        parts.push(format!("a {} filter", filter.name()));
+    }
+    (!parts.is_empty()).then(|| format!("camera: {}", parts.join("; ")))
 }
 
 /// An object in some lines: where and how large it is, how much of the picture it fills, what it is made of.
@@ -260,9 +284,20 @@ fn describe(surface: &Surface) -> Vec<String> {
                     ChannelOptics::of(&t.medium).map(|k| albedo(k.alpha_prime)).join(", "),
                     free_path.0.map(|l| short(l.into())).join(", ")
                 ),
+                format!(
+                    "colour [{}]: what a thick body of it gives back of even light, the mirror image aside{}",
+                    colour(&t.medium).map(|v| digits(v, 3)).join(", "),
+                    if t.medium.g == 0.0 { "" } else { " (as if g were 0)" }
+                ),
             ]
         }
     }
+}
+
+/// Diffuse reflectance of a half space under even light.
+fn colour(medium: &Medium) -> [f64; 3] {
+    let half_space = HalfSpace::new(medium.eta.into());
+    ChannelOptics::of(medium).map(|k| half_space.even_reflectance(k.absorbed_prime))
 }
 
 fn object_json(scene: &Scene, object: &Object, share: f64) -> Value {

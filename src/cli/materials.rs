@@ -1,8 +1,8 @@
-//! `marmor materials`.
+//! `marmor materials`: measured media, and looks.
 
-use super::stdout;
+use super::{looks, stdout};
 use marmor::Result;
-use marmor::optics::{CATALOGUE, ChannelOptics, Coefficients, Measured};
+use marmor::optics::{CATALOGUE, ChannelOptics, Coefficients, LOOKS, Measured, NamedLook, Preset};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::process::ExitCode;
@@ -10,7 +10,7 @@ use std::process::ExitCode;
 /// Options.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Only this material, with its coefficients and where they come from
+    /// Only this material or look, with its coefficients and where they come from
     name: Option<String>,
     /// Everything about each row as JSON
     #[arg(long)]
@@ -19,16 +19,22 @@ pub struct Args {
 
 /// Runs the command.
 pub fn run(args: Args) -> Result<ExitCode> {
-    let one = args.name.as_deref().map(marmor::optics::find_or_explain).transpose();
+    let one = args.name.as_deref().map(Preset::find_or_explain).transpose();
     let one = one.map_err(|e| marmor::Error::usage(e.to_string()))?;
-    let rows: Vec<&Measured> = one.map_or_else(|| CATALOGUE.iter().collect(), |row| vec![row]);
+    let (rows, looks): (Vec<&Measured>, Vec<&NamedLook>) = match one {
+        None => (CATALOGUE.iter().collect(), LOOKS.iter().collect()),
+        Some(Preset::Measured(row)) => (vec![row], Vec::new()),
+        Some(Preset::Look(look)) => (Vec::new(), vec![look]),
+    };
     let mut text = if args.json {
-        let list: Vec<Value> = rows.into_iter().map(to_json).collect();
+        let list: Vec<Value> = rows.into_iter().map(to_json).chain(looks.into_iter().map(looks::to_json)).collect();
         serde_json::to_string_pretty(&list).expect("plain values have a JSON form")
-    } else if let Some(row) = one {
-        details(row)
     } else {
-        table(&rows)
+        match one {
+            Some(Preset::Measured(row)) => details(row),
+            Some(Preset::Look(look)) => looks::details(look),
+            None => format!("{}\n\n{}", table(&rows), looks::table(&looks)),
+        }
     };
     text.push('\n');
     stdout::write(format_args!("{text}"));
@@ -151,6 +157,7 @@ fn to_json(row: &Measured) -> Value {
     let listed = row.reflectance.map(|l| json!({ "value": l.value, "digits": l.digits, "source": l.source }));
     json!({
         "name": row.name,
+        "look": false,
         "source": row.source,
         "table": row.table,
         "eta": row.eta,

@@ -25,6 +25,7 @@ mod eval;
 mod files;
 mod keep;
 mod layers;
+mod looks;
 mod materials;
 mod merge;
 mod need;

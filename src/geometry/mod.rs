@@ -4,6 +4,7 @@
 mod area_table;
 mod box_tree;
 mod clearance;
+mod clip;
 mod contact;
 mod curvature;
 mod doctor;
@@ -30,6 +31,7 @@ use crate::math::DVec3;
 
 pub use area_table::{AreaSample, AreaTable};
 pub use clearance::Clearance;
+pub use clip::{Side, reaches_into};
 pub use contact::{Contact, Meeting, Seek, lying, meeting};
 pub use curvature::Curvature;
 pub use doctor::{Findings, Mended, examine, mended};

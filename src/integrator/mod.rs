@@ -43,7 +43,7 @@ pub use volume_path::{Left, MOST_SURFACES, VolumePath, VolumePathOptions};
 pub struct CameraRay {
     /// The ray.
     pub ray: Ray,
-    /// The sample's numbers, those of the film position used up.
+    /// The sample's numbers, those of the film position and of the lens, if there is one, used up.
     pub stream: PixelStream,
 }
 

@@ -58,7 +58,7 @@ pub fn visible(view: View<'_>) -> Vec<(u32, SurfacePoint)> {
     let through = |cell: u32| {
         let at = [cell % columns, cell / columns].map(|k| k as f32 + 0.5);
         let [x, y] = [(0, columns), (1, rows)].map(|(a, n)| at[a] * camera.resolution[a] as f32 / n as f32);
-        let ray = camera.ray([x as u32, y as u32], [x.fract(), y.fract()]);
+        let ray = camera.grid_ray([x as u32, y as u32], [x.fract(), y.fract()], cell);
         let hit = view.rays.closest(&ray)?;
         let at = view.outwards(&hit);
         let at = SurfacePoint { n: at.n_geometric, ..at };

@@ -69,20 +69,13 @@ pub struct ListedReflectance {
 
 /// The medium called `name`, compared without case, blanks and punctuation: `Lowfat Milk` is `lowfat_milk`.
 pub fn find(name: &str) -> Option<&'static Measured> {
-    let plain = |s: &str| s.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect::<String>();
     let wanted = plain(name);
     CATALOGUE.iter().find(|m| plain(m.name) == wanted)
 }
 
-/// Like [`find`], with an error that names the nearest row. The caller adds where the name stands.
-///
-/// # Errors
-/// A scene error if no row has that name.
-pub fn find_or_explain(name: &str) -> crate::Result<&'static Measured> {
-    find(name).ok_or_else(|| {
-        let hint = crate::error::did_you_mean(&name.to_lowercase(), CATALOGUE.iter().map(|m| m.name));
-        crate::Error::scene(format!("no measured medium `{name}`{hint}; `marmor materials` lists them"))
-    })
+/// A name without case, blanks and punctuation.
+pub(super) fn plain(name: &str) -> String {
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
 impl Measured {
@@ -174,8 +167,6 @@ mod tests {
         }
         assert_eq!(find("Lowfat Milk").unwrap().name, "lowfat_milk");
         assert!(find("unobtainium").is_none());
-        let error = find_or_explain("ketchp").unwrap_err().to_string();
-        assert!(error.contains("did you mean `ketchup`?"), "{error}");
     }
 
     #[test]

@@ -5,6 +5,7 @@
 //! equation for the radiance that arrives from inside. No diffusion theory anywhere.
 
 use super::fresnel;
+use crate::error::{Error, Result};
 use crate::math::GaussLegendre;
 
 /// Gauss points on each side of the critical angle.
@@ -49,13 +50,77 @@ impl HalfSpace {
         }
         let h = self.h_function(absorbed);
         // Radiance that arrives at the boundary from inside, of a beam of unit flux straight down:
-        //   U_0(mu) = α/4π H(mu) H(1) / (mu + 1),
-        // and with what the boundary sends back:
-        //   U(mu) = U_0(mu) + α/2 ∫ H(mu) H(mu') / (mu + mu') mu' R(mu') U(mu') dmu'.
+        //   U_0(mu) = α/4π H(mu) H(1) / (mu + 1)
         let h_one = self.h_at(1.0, absorbed, &h);
         let first: Vec<f64> = std::iter::zip(&self.nodes, &h)
             .map(|(n, h)| albedo / (4.0 * std::f64::consts::PI) * h * h_one / (n.mu + 1.0))
             .collect();
+        self.leaving(albedo, &h, first)
+    }
+
+    /// The same under even light, which comes from all directions of the outside with one radiance: the colour of a thick body on a
+    /// cloudy day, without what the surface mirrors.
+    pub fn even_reflectance(&self, absorbed: f64) -> f64 {
+        let albedo = 1.0 - absorbed;
+        if albedo <= 0.0 {
+            return 0.0;
+        }
+        let h = self.h_function(absorbed);
+        // Inside, even light of radiance 1 (over η²) is T(mu), and its flux 2π ∫ mu T(mu) dmu.
+        let entered: Vec<f64> = self.nodes.iter().map(|n| n.weight * n.mu * (1.0 - n.reflectance)).collect();
+        let flux = 2.0 * std::f64::consts::PI * entered.iter().sum::<f64>();
+        //   U_0(mu) = α/2 ∫ H(mu) H(mu') / (mu + mu') mu' T(mu') dmu'
+        let first: Vec<f64> = std::iter::zip(&self.nodes, &h)
+            .map(|(n, at)| {
+                let sum: f64 = (0..h.len()).map(|j| h[j] * entered[j] / (n.mu + self.nodes[j].mu)).sum();
+                0.5 * albedo * at * sum / flux
+            })
+            .collect();
+        self.leaving(albedo, &h, first)
+    }
+
+    /// The medium's 1 - α′ whose [`Self::even_reflectance`] is `colour`: good to some 1e-4 of it, as that is.
+    ///
+    /// # Errors
+    /// A colour outside [0, 1).
+    pub fn absorbed_of(&self, colour: f64) -> Result<f64> {
+        if !(0.0..1.0).contains(&colour) {
+            return Err(Error::scene(format!(
+                "a colour of {colour} is of no medium that absorbs: below 1 and not negative"
+            )));
+        }
+        if colour == 0.0 {
+            return Ok(1.0);
+        }
+        // Over the root of what is absorbed the curve is nearly straight where it is bright. False position (Illinois).
+        let over = |root: f64| self.even_reflectance(root * root) - colour;
+        let (mut low, mut high) = ([0.0, over(0.0)], [1.0, -colour]);
+        if low[1] <= 0.0 {
+            return Ok(0.0);
+        }
+        let mut last = 0.0;
+        for _ in 0..60 {
+            let root = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1]);
+            let value = over(root);
+            if value.abs() < 1e-9 * colour {
+                return Ok(root * root);
+            }
+            // A side that stays twice has its value halved.
+            if value > 0.0 {
+                high[1] *= if last > 0.0 { 0.5 } else { 1.0 };
+                low = [root, value];
+            } else {
+                low[1] *= if last < 0.0 { 0.5 } else { 1.0 };
+                high = [root, value];
+            }
+            last = value;
+        }
+        Ok((0.5 * (low[0] + high[0])).powi(2))
+    }
+
+    /// Flux that leaves, where radiance `first` arrives at the boundary before that sends any back:
+    ///   U(mu) = U_0(mu) + α/2 ∫ H(mu) H(mu') / (mu + mu') mu' R(mu') U(mu') dmu'.
+    fn leaving(&self, albedo: f64, h: &[f64], first: Vec<f64>) -> f64 {
         let mut arriving = first.clone();
         for _ in 0..MAX_ROUNDS {
             let back: Vec<f64> =
@@ -117,6 +182,58 @@ mod tests {
         for eta in [0.75, 1.0, 1.05, 1.3, 1.5, 2.5, 4.0] {
             let total = HalfSpace::new(eta).reflectance(0.0);
             assert!((total - 1.0).abs() < 2e-5, "eta {eta}: {total}");
+        }
+    }
+
+    /// Photons of even light, walked here: from a cosine direction through the boundary, mirrored there inside, until they leave or are
+    /// absorbed.
+    #[test]
+    fn even_light_is_walked() {
+        use crate::math::{hash, unit_f32};
+        let mut count = 0_u64;
+        let mut number = || {
+            count += 1;
+            f64::from(unit_f32((hash(count) >> 32) as u32))
+        };
+        for (eta, absorbed) in [(1.3, 0.01), (1.3, 0.2), (1.5, 0.003), (1.0, 0.05)] {
+            let (half_space, photons) = (HalfSpace::new(eta), 60_000);
+            let (mut entered, mut left) = (0.0, 0.0);
+            for _ in 0..photons {
+                let outside = fresnel::split(eta, number().sqrt());
+                let (mut mu, mut depth, mut weight) = (-outside.cosine, 0.0, outside.transmittance);
+                entered += weight;
+                while weight > 1e-4 {
+                    depth += mu * (1.0 - number()).ln();
+                    while depth < 0.0 {
+                        let back = reflectance_inside(eta, mu);
+                        left += weight * (1.0 - back);
+                        weight *= back;
+                        (depth, mu) = (-depth, -mu);
+                    }
+                    (weight, mu) = (weight * (1.0 - absorbed), 2.0 * number() - 1.0);
+                }
+            }
+            let (walked, ours) = (left / entered, half_space.even_reflectance(absorbed));
+            // A photon's share varies by less than 0.5.
+            let error = 0.5 / f64::from(photons).sqrt();
+            assert!((walked - ours).abs() < 4.0 * error, "eta {eta}, 1 - α {absorbed}: {ours}, walked {walked}");
+            let straight = half_space.reflectance(absorbed);
+            assert!(ours > straight, "slanted light turns round sooner: {ours}, straight {straight}");
+        }
+    }
+
+    #[test]
+    fn colours_come_back() {
+        for eta in [0.75, 1.0, 1.3, 1.5, 2.5] {
+            let half_space = HalfSpace::new(eta);
+            assert!((half_space.even_reflectance(0.0) - 1.0).abs() < 5e-5, "{eta}");
+            for colour in [0.0, 1e-4, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999] {
+                let back = half_space.even_reflectance(half_space.absorbed_of(colour).unwrap());
+                assert!((back - colour).abs() <= 1e-8 * colour, "eta {eta}: {colour} came back as {back}");
+            }
+            for wrong in [-0.1, 1.0, f64::NAN] {
+                assert!(half_space.absorbed_of(wrong).is_err());
+            }
         }
     }
 

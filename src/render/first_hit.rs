@@ -6,7 +6,7 @@ use crate::geometry::Curvature;
 use crate::integrator::{Local, LocalShape, View};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, HalfSpace};
-use crate::query::Hit;
+use crate::query::{Hit, Ray};
 use crate::scene::{Scene, Surface};
 use rayon::prelude::*;
 
@@ -38,8 +38,7 @@ pub fn first_hit(view: View<'_>, window: Window, what: Aov) -> Image {
     let shapes = if what == Aov::Validity { shapes(view.scene) } else { Vec::new() };
     let albedo = if what == Aov::Albedo { albedos(view.scene) } else { Vec::new() };
     let camera = &view.scene.camera;
-    let look = |pixel: [u32; 2], offset: [f32; 2]| -> Option<Rgb> {
-        let ray = camera.ray(pixel, offset);
+    let look = |ray: Ray| -> Option<Rgb> {
         let hit = view.rays.closest(&ray)?;
         let mesh = &view.scene.objects[hit.mesh as usize].mesh;
         match what {
@@ -64,10 +63,12 @@ pub fn first_hit(view: View<'_>, window: Window, what: Aov) -> Image {
     let pixel = |pixel: [u32; 2]| {
         if matches!(what, Aov::Position | Aov::Depth) {
             let nothing = if what == Aov::Depth { f32::INFINITY } else { 0.0 };
-            return look(pixel, [0.5, 0.5]).unwrap_or(Rgb::splat(nothing));
+            return look(camera.ray(pixel, [0.5, 0.5])).unwrap_or(Rgb::splat(nothing));
         }
         let place = |k: u32| (k as f32 + 0.5) / SIDE as f32;
-        let looks = (0..SIDE * SIDE).filter_map(|k| look(pixel, [place(k % SIDE), place(k / SIDE)]));
+        // Of a lens each through another place.
+        let ray = |k: u32| camera.grid_ray(pixel, [place(k % SIDE), place(k / SIDE)], k);
+        let looks = (0..SIDE * SIDE).filter_map(|k| look(ray(k)));
         if what == Aov::Validity {
             return mean_of_numbers(looks);
         }

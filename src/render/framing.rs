@@ -1,10 +1,11 @@
 //! What the camera gets to see: the share of the picture that each object has, and whether there is anything in it at all.
 
 use crate::film::Window;
+use crate::geometry::{Side, reaches_into};
 use crate::integrator::View;
 use crate::math::{DVec3, Vec3};
 use crate::query::Ray;
-use crate::scene::{Object, Scene, Surface};
+use crate::scene::{Camera, Object, Scene, Surface};
 use rayon::prelude::*;
 
 /// Rays to each side of the picture, at most.
@@ -22,7 +23,7 @@ pub fn shares(view: View<'_>, window: Window) -> Vec<f64> {
     let seen = |i: u32| {
         let (x, dx) = place(i % across, across, window.x0, width);
         let (y, dy) = place(i / across, down, window.y0, height);
-        view.rays.closest(&view.scene.camera.ray([x, y], [dx, dy])).map(|hit| hit.mesh as usize)
+        view.rays.closest(&view.scene.camera.grid_ray([x, y], [dx, dy], i)).map(|hit| hit.mesh as usize)
     };
     let seen: Vec<Option<usize>> = (0..across * down).into_par_iter().map(seen).collect();
     let mut counts = vec![0_u32; view.scene.objects.len()];
@@ -47,12 +48,11 @@ pub fn nothing_in_view(view: View<'_>, window: Window, shares: &[f64]) -> Option
     if shares.iter().any(|s| *s > 0.0) {
         return None;
     }
-    let planes = planes(scene, window);
+    let sights = sights(scene, window);
     let reaches = |object: &Object| {
         let mesh = &object.mesh;
-        (0..mesh.triangles.len() as u32)
-            .into_par_iter()
-            .any(|t| mesh.area(t) > 0.0 && is_cut(mesh.corners(t).map(|p| p - scene.camera.origin), &planes))
+        let seen = |t| sights.iter().any(|sides| reaches_into(mesh.corners(t), sides));
+        (0..mesh.triangles.len() as u32).into_par_iter().any(|t| mesh.area(t) > 0.0 && seen(t))
     };
     if scene.objects.iter().any(reaches) {
         return None;
@@ -60,41 +60,32 @@ pub fn nothing_in_view(view: View<'_>, window: Window, shares: &[f64]) -> Option
     aim(view)
 }
 
-/// Inward normals of the four sides of the view, and of the plane through the camera.
-fn planes(scene: &Scene, window: Window) -> [DVec3; 5] {
-    let direction = |x: u32, y: u32| scene.camera.ray([x, y], [0.0; 2]).direction.as_dvec3();
-    let corners = [
-        direction(window.x0, window.y0),
-        direction(window.x0, window.y1),
-        direction(window.x1, window.y1),
-        direction(window.x1, window.y0),
-    ];
-    let middle: DVec3 = corners.into_iter().sum();
-    let side = |k: usize| {
-        let normal: DVec3 = corners[k].cross(corners[(k + 1) % 4]);
-        if normal.dot(middle) < 0.0 { -normal } else { normal }
-    };
-    [side(0), side(1), side(2), side(3), scene.camera.forward().as_dvec3()]
+/// The sides of what is seen through `window` from each place of the eye: the lens's middle and places along its rim, between which
+/// nothing much is seen that none of them sees.
+fn sights(scene: &Scene, window: Window) -> Vec<[Side; 5]> {
+    let camera = &scene.camera;
+    camera.eyes().into_iter().map(|eye| sides(camera, window, eye)).collect()
 }
 
-/// Whether anything of a triangle is left when what lies outside of the planes through the origin is cut off.
-fn is_cut(triangle: [DVec3; 3], planes: &[DVec3; 5]) -> bool {
-    let mut polygon = triangle.to_vec();
-    for plane in planes {
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (i, &p) in polygon.iter().enumerate() {
-            let next = polygon[(i + 1) % polygon.len()];
-            let [a, b] = [p, next].map(|q| q.dot(*plane));
-            if a > 0.0 {
-                kept.push(p);
-            }
-            if (a > 0.0) != (b > 0.0) {
-                kept.push(p + (next - p) * (a / (a - b)));
-            }
-        }
-        polygon = kept;
-    }
-    !polygon.is_empty()
+/// The four sides of the view from one place of the lens, and the plane through the camera.
+fn sides(camera: &Camera, window: Window, eye: [f32; 2]) -> [Side; 5] {
+    let corner = |x: u32, y: u32| {
+        let ray = camera.ray_from([x, y], [0.0; 2], eye);
+        (ray.origin, ray.direction.as_dvec3())
+    };
+    let corners = [
+        corner(window.x0, window.y0),
+        corner(window.x0, window.y1),
+        corner(window.x1, window.y1),
+        corner(window.x1, window.y0),
+    ];
+    let middle = corners.iter().map(|(from, towards)| from + towards).sum::<DVec3>() / 4.0;
+    let side = |k: usize| {
+        let [(at, towards), (beside, there)] = [corners[k], corners[(k + 1) % 4]];
+        let normal = towards.cross(beside - at + there);
+        Side { at, normal: if normal.dot(middle - at) < 0.0 { -normal } else { normal } }
+    };
+    [side(0), side(1), side(2), side(3), Side { at: camera.origin, normal: camera.forward().as_dvec3() }]
 }
 
 /// What to look at.
@@ -121,25 +112,28 @@ mod tests {
     use super::*;
 
     /// The view down the z axis, 90 degrees wide and high.
-    const PLANES: [DVec3; 5] = [
-        DVec3::new(1.0, 0.0, 1.0),
-        DVec3::new(-1.0, 0.0, 1.0),
-        DVec3::new(0.0, 1.0, 1.0),
-        DVec3::new(0.0, -1.0, 1.0),
-        DVec3::new(0.0, 0.0, 1.0),
+    const SIDES: [Side; 5] = [
+        Side { at: DVec3::ZERO, normal: DVec3::new(1.0, 0.0, 1.0) },
+        Side { at: DVec3::ZERO, normal: DVec3::new(-1.0, 0.0, 1.0) },
+        Side { at: DVec3::ZERO, normal: DVec3::new(0.0, 1.0, 1.0) },
+        Side { at: DVec3::ZERO, normal: DVec3::new(0.0, -1.0, 1.0) },
+        Side { at: DVec3::ZERO, normal: DVec3::new(0.0, 0.0, 1.0) },
     ];
 
     #[test]
     fn a_triangle_is_in_view_if_any_part_of_it_is() {
         let at = |x: f64, y: f64, z: f64, size: f64| {
             let corner = DVec3::new(x, y, z);
-            is_cut([corner, corner + DVec3::X * size, corner + DVec3::Y * size], &PLANES)
+            reaches_into([corner, corner + DVec3::X * size, corner + DVec3::Y * size], &SIDES)
         };
         assert!(at(0.0, 0.0, 5.0, 1e-9), "however small");
         assert!(at(-1000.0, -1000.0, 1.0, 1e4), "its corners are all outside, its middle is not");
         assert!(!at(0.0, 0.0, -5.0, 1.0), "behind");
         // In the box around the view's corner, but beyond both of its sides.
-        assert!(!is_cut([DVec3::new(2.0, 0.5, 1.0), DVec3::new(0.5, 2.0, 1.0), DVec3::new(2.0, 2.0, 1.0)], &PLANES));
+        assert!(!reaches_into(
+            [DVec3::new(2.0, 0.5, 1.0), DVec3::new(0.5, 2.0, 1.0), DVec3::new(2.0, 2.0, 1.0)],
+            &SIDES
+        ));
         assert!(at(-5.5, 0.0, 5.0, 1.0) && !at(-6.5, 0.0, 5.0, 1.0), "the left side");
     }
 }

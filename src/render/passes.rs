@@ -251,7 +251,7 @@ fn render_tile<I: Integrator>(
         .iter()
         .zip(places.numbers())
         .zip(streams)
-        .map(|((&pixel, place), stream)| CameraRay { ray: camera.ray(pixel, place), stream })
+        .map(|((&pixel, place), mut stream)| CameraRay { ray: camera.sample(pixel, place, &mut stream), stream })
         .collect();
     let (mut out, mut tally) = (vec![Rgb::BLACK; rays.len()], Tally::default());
     integrator.radiance(view, shared, &rays, &mut out, &mut tally);

@@ -2,6 +2,7 @@
 //! Not for: what a number is used for. Read first: `stream.rs`.
 
 mod cache_stream;
+mod filter;
 mod pairs;
 mod sobol;
 mod stream;
@@ -9,6 +10,7 @@ mod turn;
 mod warp;
 
 pub use cache_stream::{CacheStream, Points};
+pub use filter::PixelFilter;
 pub use pairs::Pairs;
 pub use stream::PixelStream;
 pub use turn::Turn;

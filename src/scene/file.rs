@@ -3,17 +3,17 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use super::camera_entry::{self, CameraEntry};
 use super::environment::{self, EnvironmentEntry};
 use super::lights::{self, LightSource};
 use super::materials::{self, MaterialEntry};
 use super::objects::{self, ObjectEntry};
-use super::options::{MethodOptions, RenderOptions, named};
+use super::options::{FilterName, MethodOptions, RenderOptions};
 use super::tree::{Fields, Node, Value};
-use super::values::{UNIT, named_value, switch, unit, unit_vector, vector, whole, whole_or_none};
+use super::values::{UNIT, named_value, switch, unit, whole, whole_or_none};
 use super::{Geometry, difference};
 use crate::error::{Error, Result};
 use crate::input;
-use crate::math::DVec3;
 
 /// A scene file whose numbers are in range and whose names exist. docs/scene-format.md lists every key.
 #[derive(Clone, Debug)]
@@ -37,34 +37,6 @@ pub struct SceneFile {
     /// `[render]`.
     pub render: RenderOptions,
     root: Node,
-}
-
-/// `[camera]`.
-#[derive(Clone, Debug, PartialEq)]
-pub struct CameraEntry {
-    /// Pinhole \[unit\].
-    pub position: DVec3,
-    /// A point in the middle of the picture \[unit\].
-    pub look_at: DVec3,
-    /// Upwards in the picture, of any length; need not be orthogonal to the view.
-    pub up: DVec3,
-    /// Full angle of view \[degrees\], in (0, 180).
-    pub fov: f64,
-    /// The side of the picture that `fov` spans.
-    pub fov_axis: FovAxis,
-    /// Pixels across and down, 1 to 65536 each.
-    pub resolution: [u32; 2],
-}
-
-named! {
-    /// A side of the picture.
-    FovAxis, "side of the picture",
-    /// Bottom to top.
-    Vertical = "vertical",
-    /// Left to right.
-    Horizontal = "horizontal",
-    /// Whichever has fewer pixels.
-    Smaller = "smaller"
 }
 
 /// Memory for each byte of a scene file while it is parsed; measured with 100 000 objects.
@@ -162,7 +134,7 @@ impl SceneFile {
         let file = Self {
             path: path.to_path_buf(),
             unit_in_mm,
-            camera: camera(&top)?,
+            camera: camera_entry::read(&top)?,
             objects: objects::read(&top, &materials)?,
             environment: environment::read(&top)?,
             lights: lights::read(&top, unit_in_mm)?,
@@ -186,37 +158,6 @@ fn refuse_unknown_thickness(file: &SceneFile) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn camera(top: &Fields<'_>) -> Result<CameraEntry> {
-    let expected = "a [camera] with position, look_at, fov and resolution";
-    let c = top.table("camera")?.ok_or_else(|| top.missing("camera", expected))?;
-    c.only("[camera]", &["position", "look_at", "up", "fov", "fov_axis", "resolution"])?;
-    let point = "three numbers [x, y, z]";
-    let side = |v: f64| (1.0..=65536.0).contains(&v) && v.fract() == 0.0;
-    let camera = CameraEntry {
-        position: c.need("position", point, vector)?,
-        look_at: c.need("look_at", point, vector)?,
-        up: c
-            .get("up", "three numbers [x, y, z], not all 0", |n| vector(n).filter(|v| *v != DVec3::ZERO))?
-            .unwrap_or(DVec3::Y),
-        fov: c.need("fov", "degrees above 0 and below 180", |n| n.number().filter(|v| *v > 0.0 && *v < 180.0))?,
-        fov_axis: named_value(&c, "fov_axis")?.unwrap_or(FovAxis::Vertical),
-        resolution: c.need("resolution", "[width, height], each a whole number from 1 to 65536", |n| {
-            n.numbers::<2>().filter(|wh| wh.iter().all(|v| side(*v))).map(|wh| wh.map(|v| v as u32))
-        })?,
-    };
-    let view = unit_vector(camera.look_at - camera.position).ok_or_else(|| {
-        c.error_at("look_at", "is the same point as `camera.position`; expected a point in front of the camera")
-    })?;
-    let aside = unit_vector(camera.up).map_or(0.0, |up| up.cross(view).length());
-    if aside < 1e-6 {
-        return Err(c.error_at(
-            if c.has("up") { "up" } else { "look_at" },
-            format_args!("leaves the view parallel to up ({}); set `up` to another direction", camera.up),
-        ));
-    }
-    Ok(camera)
 }
 
 fn method(top: &Fields<'_>) -> Result<MethodOptions> {
@@ -263,8 +204,20 @@ fn method(top: &Fields<'_>) -> Result<MethodOptions> {
 
 fn render(top: &Fields<'_>) -> Result<RenderOptions> {
     let Some(r) = top.table("render")? else { return Ok(RenderOptions::default()) };
-    r.only("[render]", &["spp", "seed", "exposure"])?;
+    r.only("[render]", &["spp", "seed", "exposure", "filter", "filter_radius"])?;
+    let filter = named_value(&r, "filter")?;
+    let filter_radius = r.get("filter_radius", "a number of pixels from 0.25 to 8", |n| {
+        n.number().filter(|v| (0.25..=8.0).contains(v))
+    })?;
+    if filter_radius.is_some() && filter.is_none_or(|f| f == FilterName::Box) {
+        return Err(r.error_at(
+            "filter_radius",
+            "stands without a filter that has one: the box is the pixel itself; set filter = \"gaussian\" or \"blackman-harris\", or remove it",
+        ));
+    }
     Ok(RenderOptions {
+        filter,
+        filter_radius,
         spp: whole(&r, "spp", 1 << 24)?,
         seed: r.get("seed", "a whole number, not negative", |n| n.integer().and_then(|i| u64::try_from(i).ok()))?,
         exposure: r.get("exposure", "stops from -64 to 64", |n| n.number().filter(|v| v.abs() <= 64.0))?,

@@ -3,19 +3,17 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-use super::file::{FovAxis, SceneFile};
+use super::file::SceneFile;
 use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
-use super::values::unit_vector;
 use super::{
-    Camera, Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, precision, sheets,
-    warnings,
+    Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets, warnings,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
     Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, Solid, examine, load_obj, mended, rectangle, sphere,
 };
-use crate::math::{Aabb, DVec3, Vec3};
+use crate::math::{Aabb, DVec3};
 use crate::memory;
 use crate::words::{counted, either};
 
@@ -75,7 +73,7 @@ impl Scene {
             name: file.path.display().to_string(),
             unit_in_mm: file.unit_in_mm,
             centre,
-            camera: camera(file, centre)?,
+            camera: file.camera.camera(&file.path, centre, file.render.filter())?,
             objects,
             bodies,
             materials,
@@ -97,6 +95,7 @@ impl Scene {
         for (group, object) in grouped(&file.objects).iter().zip(&scene.objects) {
             sheets::refuse_folds(&file.objects[group[0]], object, centre)?;
         }
+        eye::refuse_cut(&file.camera, &scene)?;
         // From here on: the gap between two surfaces depends on what rays are traced in.
         said.extend(warnings::of(file, &scene));
         let method = file.method.name.unwrap_or_else(|| scene.default_method());
@@ -270,35 +269,4 @@ fn smooths_nothing(entry: &ObjectEntry, alone: usize, found: &Findings, transluc
 /// Middle of the box around all meshes.
 fn centre<'a>(meshes: impl IntoIterator<Item = &'a ObjMesh>) -> Option<DVec3> {
     meshes.into_iter().filter_map(ObjMesh::bounds).reduce(Aabb::join).map(|bounds| bounds.centre())
-}
-
-fn camera(file: &SceneFile, centre: DVec3) -> Result<Camera> {
-    let c = &file.camera;
-    let [width, height] = c.resolution.map(f64::from);
-    let tangent = (0.5 * c.fov).to_radians().tan();
-    let vertical = match c.fov_axis {
-        FovAxis::Vertical => true,
-        FovAxis::Horizontal => false,
-        FovAxis::Smaller => height <= width,
-    };
-    let (half_width, half_height) =
-        if vertical { (tangent * width / height, tangent) } else { (tangent, tangent * height / width) };
-    let single = |v: DVec3| unit_vector(v).unwrap_or(DVec3::ZERO).as_vec3();
-    let origin = c.position - centre;
-    let built: Option<Camera> = Camera::new(
-        c.resolution,
-        origin,
-        single(c.look_at - c.position),
-        single(c.up),
-        half_width as f32,
-        half_height as f32,
-    );
-    built
-        .filter(|_| origin.as_vec3().is_finite() && Vec3::new(half_width as f32, half_height as f32, 0.0).is_finite())
-        .ok_or_else(|| {
-            Error::scene(format!(
-                "{}: `camera` cannot be held in single precision; bring it nearer",
-                file.path.display()
-            ))
-        })
 }

@@ -1,12 +1,12 @@
 //! `[material.NAME]` as typed.
 
 use super::tree::{Fields, Node};
-use super::values::{RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
+use super::values::{self, RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
 use super::{Dielectric, Emission, Surface, Translucent, opaque};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
-use crate::optics::{self, Medium};
+use crate::optics::{Look, Medium, Preset};
 
 /// One material, its coefficients already per scene unit.
 #[derive(Clone, Debug)]
@@ -83,6 +83,8 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
         "sigma_s_prime",
         "sigma_s",
         "sigma_a",
+        "colour",
+        "mean_free_path",
         "g",
         "eta",
         "per",
@@ -95,13 +97,13 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
     m.only("a translucent material", &keys)?;
     let scale = m.get("scale", "a number above 0", |n| n.number().filter(|v| *v > 0.0))?.unwrap_or(1.0);
     let eta = m.get("eta", ETA, refractive_index)?;
-    let (mut medium, source) = match m.get("preset", "the name of a measured medium", Node::text)? {
-        Some(name) => preset(m, name, unit_in_mm)?,
+    let (mut medium, source) = match m.get("preset", "the name of a measured medium or of a look", Node::text)? {
+        Some(name) => preset(m, name, unit_in_mm, eta)?,
+        None if m.has("colour") || m.has("mean_free_path") => {
+            (look(m, unit_in_mm, eta)?, format!("{}, from its colour", m.at()))
+        }
         None => (numbers(m, unit_in_mm, eta)?, m.at()),
     };
-    if let Some(eta) = eta {
-        medium.eta = eta as f32;
-    }
     if scale != 1.0 {
         let scaled = |c: Rgb| c.map(|v| (f64::from(v) * scale) as f32);
         (medium.sigma_a, medium.sigma_s) = (scaled(medium.sigma_a), scaled(medium.sigma_s));
@@ -125,19 +127,52 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
     Ok(Surface::translucent(translucent))
 }
 
-fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64) -> Result<(Medium, String)> {
-    let measured = optics::find(name).ok_or_else(|| {
-        let known: Vec<&str> = optics::CATALOGUE.iter().map(|m| m.name).collect();
-        m.error_at("preset", unknown(name, &known))
-    })?;
-    for key in ["sigma_s_prime", "sigma_s", "sigma_a", "g", "per"] {
+/// A named medium; its colour, if it has one, whatever `eta`.
+fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64, eta: Option<f64>) -> Result<(Medium, String)> {
+    let preset = Preset::find_or_explain(name).map_err(|e| m.error_at("preset", format_args!("is wrong: {e}")))?;
+    for key in ["sigma_s_prime", "sigma_s", "sigma_a", "colour", "mean_free_path", "g", "per"] {
         if m.has(key) {
             return Err(
                 m.error_at(key, "stands beside `preset`, which has its own; remove one (`eta` and `scale` may stay)")
             );
         }
     }
-    Ok((measured.medium(unit_in_mm), format!("{name} [{}]", measured.source)))
+    Ok(match preset {
+        Preset::Measured(measured) => {
+            let medium = measured.medium(unit_in_mm);
+            let eta = eta.map_or(medium.eta, |eta| eta as f32);
+            (Medium { eta, ..medium }, format!("{name} [{}]", measured.source))
+        }
+        Preset::Look(look) => {
+            let medium = look.medium(unit_in_mm, eta).map_err(|e| m.error(e))?;
+            (medium, format!("{} (a look, not measured)", look.name))
+        }
+    })
+}
+
+/// A medium from how it looks.
+fn look(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> {
+    if let Some(key) = ["sigma_s_prime", "sigma_s", "sigma_a"].into_iter().find(|key| m.has(key)) {
+        return Err(m.error_at(
+            key,
+            "stands beside `colour` and `mean_free_path`, of which it follows; give one or the others",
+        ));
+    }
+    let expected =
+        "one number or three, from 0 to below 1: what absorbs nothing has `sigma_a` = 0 in place of a colour";
+    let colour = m.need("colour", expected, |n| values::colour(n, |v| (0.0..1.0).contains(&v)))?;
+    let length = |n: &Node| values::colour(n, |v| v > 0.0 && (v as f32).is_normal());
+    let lengths = m.need("mean_free_path", "one length or three above 0", length)?;
+    let per = m.get("per", UNIT, unit)?;
+    let mean_free_path = lengths.map(|l| per.map_or(l, |per| l * (per / unit_in_mm)));
+    let eta = eta.ok_or_else(|| m.missing("eta", ETA))?;
+    let look = Look { colour, mean_free_path, g: cosine(m)?.unwrap_or(0.0), eta };
+    look.medium().map_err(|e| m.error(format!("{e}; see `per` and `mean_free_path`")))
+}
+
+/// The mean cosine, if it is there.
+fn cosine(m: &Fields<'_>) -> Result<Option<f64>> {
+    m.get("g", G, |n| n.number().filter(|v| *v > -1.0 && *v < 1.0 && (*v as f32).abs() < 1.0))
 }
 
 /// A medium from coefficients; without a preset none of them has a default, except that reduced scattering may come
@@ -147,7 +182,7 @@ fn numbers(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> 
     let per = m.get("per", UNIT, unit)?;
     let (reduced, full) =
         (m.get("sigma_s_prime", COEFFICIENT, coefficient)?, m.get("sigma_s", COEFFICIENT, coefficient)?);
-    let g = m.get("g", G, |n| n.number().filter(|v| *v > -1.0 && *v < 1.0 && (*v as f32).abs() < 1.0))?;
+    let g = cosine(m)?;
     let (sigma_s, g) = match (reduced, full, g) {
         (Some(_), Some(_), _) => {
             return Err(m.error_at("sigma_s", "stands beside `sigma_s_prime`, which is sigma_s (1 - g); remove one"));
@@ -159,7 +194,10 @@ fn numbers(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> 
         (None, Some(full), Some(g)) => (full, g),
         (None, Some(_), None) => return Err(m.missing("g", &format!("{G}, beside `sigma_s`"))),
         (None, None, _) => {
-            return Err(m.missing("sigma_s_prime", &format!("{COEFFICIENT}; or `sigma_s` and `g`, or a `preset`")));
+            return Err(m.missing(
+                "sigma_s_prime",
+                &format!("{COEFFICIENT}; or `sigma_s` and `g`, `colour` and `mean_free_path`, or a `preset`"),
+            ));
         }
     };
     let sigma_a = m.need("sigma_a", COEFFICIENT, coefficient)?;

@@ -5,12 +5,15 @@
 
 mod body;
 mod camera;
+mod camera_entry;
 mod difference;
 mod doctor;
 mod energy;
 mod environment;
+mod eye;
 mod file;
 mod insides;
+mod lens;
 mod lights;
 mod load;
 mod materials;
@@ -31,13 +34,16 @@ mod warnings;
 mod world;
 
 pub use body::Body;
+pub use camera_entry::{CameraEntry, FovAxis, LensEntry, Projection};
 pub use environment::EnvironmentEntry;
-pub use file::{CameraEntry, FovAxis, SceneFile};
+pub use file::SceneFile;
 pub use lights::{LightKind, LightSource};
 pub use materials::MaterialEntry;
 pub use objects::{Geometry, NormalsChoice, ObjectEntry};
 pub use obstacle::{Obstacle, ObstacleKind};
-pub use options::{EntrySampling, Estimator, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread};
+pub use options::{
+    EntrySampling, Estimator, FilterName, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread,
+};
 pub use walkable::ExitanceBy;
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
 
@@ -49,6 +55,7 @@ pub use self::{
     doctor::Remark,
     environment::Environment,
     insides::{Contacts, Insides, Nests},
+    lens::Lens,
     options::default_photons,
     view::View,
 };

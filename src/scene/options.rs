@@ -1,6 +1,7 @@
 //! What `[method]` and `[render]` may hold; the options of the command line override it.
 
 use crate::bssrdf::ModelName;
+use crate::sampling::PixelFilter;
 
 /// Makes an enum of names: `ALL`, `name()`, `FromStr` with the nearest name in its message.
 macro_rules! named {
@@ -176,6 +177,17 @@ impl MethodOptions {
     }
 }
 
+named! {
+    /// How the samples of a pixel lie around it.
+    FilterName, "filter",
+    /// Evenly over the pixel.
+    Box = "box",
+    /// A Gaussian, cut off at four standard deviations.
+    Gaussian = "gaussian",
+    /// The window of Blackman and Harris: narrower than it reaches, and smooth at its end.
+    BlackmanHarris = "blackman-harris"
+}
+
 /// `[render]`: how long and how shown.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderOptions {
@@ -185,6 +197,22 @@ pub struct RenderOptions {
     pub seed: Option<u64>,
     /// Exposure of the PNG \[stops\], -64 to 64.
     pub exposure: Option<f64>,
+    /// How the samples of a pixel lie around it; a box unless it says.
+    pub filter: Option<FilterName>,
+    /// How far a filter that is no box reaches from the pixel's middle [pixels], 0.25 to 8.
+    pub filter_radius: Option<f64>,
+}
+
+impl RenderOptions {
+    /// The filter asked for; without a radius a Gaussian reaches 2 pixels, the window of Blackman and Harris 1.5.
+    pub fn filter(&self) -> PixelFilter {
+        let radius = |default: f64| self.filter_radius.unwrap_or(default);
+        match self.filter {
+            None | Some(FilterName::Box) => PixelFilter::default(),
+            Some(FilterName::Gaussian) => PixelFilter::gaussian(radius(2.0)),
+            Some(FilterName::BlackmanHarris) => PixelFilter::blackman_harris(radius(1.5)),
+        }
+    }
 }
 
 #[cfg(test)]

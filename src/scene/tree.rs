@@ -309,6 +309,11 @@ impl<'a> Fields<'a> {
         self.place.within(self.file)
     }
 
+    /// Where `key` is, or else the table.
+    pub(super) fn at_key(&self, key: &str) -> String {
+        self.node(key).map_or(self.place, |node| &node.place).within(self.file)
+    }
+
     fn node(&self, key: &str) -> Option<&'a Node> {
         self.entries.iter().find(|(name, _)| name == key).map(|(_, node)| node)
     }
