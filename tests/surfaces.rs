@@ -110,7 +110,17 @@ fn lamps_on_surfaces_are_worth_what_the_formula_says() {
             let f = bsdf.eval(&at, wo, w.as_vec3());
             (0..3).for_each(|c| sum[c] += f64::from(f[c]) * part);
         }
-        for method in ["name=direct", "name=path", "name=path,bounces=0", "name=volume_path"] {
+        // In a haze that is hardly there, with light straight through its boundary, the surface is asked in a medium.
+        let haze = sphere("haze", [0.0; 3], 40.0, 8, "haze")
+            + &translucent("haze", "sigma_s = 1e-7\nsigma_a = 0\ng = 0\neta = 1");
+        for (method, around) in [
+            ("name=direct", ""),
+            ("name=path", ""),
+            ("name=path,bounces=0", ""),
+            ("name=volume_path", ""),
+            ("name=volume_path", &haze),
+        ] {
+            let scene = scene.clone() + around;
             let set: Vec<String> = method.split(',').map(|set| format!("method.{set}")).collect();
             let set: Vec<&str> = set.iter().map(String::as_str).collect();
             let found = means(&scene, &set, 1024);
