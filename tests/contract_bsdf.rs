@@ -18,7 +18,7 @@ fn number(i: u64) -> f32 {
 
 fn point() -> SurfacePoint {
     let n = Vec3::new(0.6, 0.0, 0.8);
-    SurfacePoint { x: DVec3::ZERO, n_geometric: n, n, error: 0.0 }
+    SurfacePoint { x: DVec3::ZERO, n_geometric: n, n, uv: [0.0; 2], error: 0.0 }
 }
 
 /// A unit vector on the side of the normal.
