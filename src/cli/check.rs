@@ -107,7 +107,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     }
     let mega = |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6);
     println!(
-        "\nmemory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, cache or photons {}; \
+        "\nmemory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, textures {}, cache or photons {}; \
          available {}",
         mega(need.peak),
         mega(need.film),
@@ -115,6 +115,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         mega(need.meshes),
         mega(need.trees),
         mega(need.environment),
+        mega(need.textures),
         mega(need.pass),
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );

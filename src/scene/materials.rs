@@ -2,7 +2,7 @@
 
 use super::tree::{Fields, Node};
 use super::values::{self, RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
-use super::{Dielectric, Emission, Surface, Translucent};
+use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, textures};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
@@ -15,6 +15,8 @@ pub struct MaterialEntry {
     pub name: String,
     /// The kind and its numbers.
     pub surface: Surface,
+    /// The picture that its albedo is, of a diffuse one; [`Self::surface`] is white then.
+    pub albedo_image: Option<TextureEntry>,
     /// File and line, for messages.
     pub at: String,
     /// What is wrong with it unless each of its objects has a `thickness`.
@@ -32,13 +34,16 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
     let entries = table.tables().map(|entry| {
         let (name, m) = entry?;
         let kind = m.need("type", "\"translucent\", \"dielectric\", \"diffuse\" or \"emissive\"", Node::text)?;
-        let mut without_thickness = None;
+        let (mut without_thickness, mut albedo_image) = (None, None);
+        textures::refuse_elsewhere(&m, (kind == "diffuse").then_some("albedo"))?;
         let surface = match kind {
             "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), &mut without_thickness)?,
             "diffuse" => {
                 m.only("a diffuse material", &["type", "albedo"])?;
-                let expected = "one number or three from 0 to 1";
-                let albedo = m.need("albedo", expected, |n| colour(n, |v| (0.0..=1.0).contains(&v)))?;
+                albedo_image = textures::read(&m, "albedo")?;
+                let expected = "one number or three from 0 to 1, or { image = \"FILE\" }";
+                let share = |n: &Node| colour(n, |v| (0.0..=1.0).contains(&v));
+                let albedo = if albedo_image.is_some() { [1.0; 3] } else { m.need("albedo", expected, share)? };
                 Surface::diffuse(rgb(albedo))
             }
             "emissive" => {
@@ -54,7 +59,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),
         };
-        Ok(MaterialEntry { name: name.to_string(), surface, at: m.at(), without_thickness })
+        Ok(MaterialEntry { name: name.to_string(), surface, albedo_image, at: m.at(), without_thickness })
     });
     entries.collect()
 }
