@@ -4,12 +4,19 @@
 use marmor::geometry::SurfacePoint;
 use marmor::math::{DVec3, Rgb, Vec3, hash, unit_f32};
 use marmor::optics::{reflectance, refract};
-use marmor::surface::{Boundary, Bsdf, Lambertian};
+use marmor::surface::{Boundary, Bsdf, Lambertian, Texture, Textured, Wrap};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 fn kinds() -> Vec<Box<dyn Bsdf>> {
     let albedo = Rgb([0.2, 0.5, 1.0]);
-    vec![Box::new(Lambertian { albedo }), Box::new(Boundary { eta: 1.5 }), Box::new(Boundary { eta: 0.7 })]
+    let one = Arc::new(Texture::new("one".into(), 1, vec![albedo], Wrap::Repeat));
+    vec![
+        Box::new(Lambertian { albedo }),
+        Box::new(Textured { albedo: one }),
+        Box::new(Boundary { eta: 1.5 }),
+        Box::new(Boundary { eta: 0.7 }),
+    ]
 }
 
 fn number(i: u64) -> f32 {

@@ -35,6 +35,10 @@ fn what_is_told_is_what_is_taken() {
     let folder = folder.path();
     let image = Image::from_fn([2048, 1024], |x, y| Rgb::splat((x ^ y) as f32 * 1e-3));
     save(&image, &folder.join("sky.exr"), &Metadata::default(), Default::default()).unwrap();
+    let mut encoder = png::Encoder::new(fs::File::create(folder.join("picture.png")).unwrap(), 2048, 1024);
+    encoder.set_color(png::ColorType::Rgb);
+    let codes: Vec<u8> = (0..2048 * 1024 * 3_u32).map(|i| (marmor::math::hash(i.into()) >> 56) as u8).collect();
+    encoder.write_header().unwrap().write_image_data(&codes).unwrap();
     let fine = ["-D", "object.0.rings=256", "-D", "object.0.segments=512"];
     // Read from files, with corners in common and without, with normals and without.
     let ball = marmor::geometry::sphere(DVec3::ZERO, 1.0, 300, 600);
@@ -51,13 +55,25 @@ fn what_is_told_is_what_is_taken() {
         let scene = text.replacen(shape, &format!("mesh = \"{name}.obj\""), 1);
         fs::write(folder.join(format!("{name}.toml")), scene).unwrap();
     }
-    let cases: [(&str, &[&str]); 7] = [
+    let picture = |file: &str| {
+        [
+            "-D object.1.material=picture -D material.picture.type=diffuse -D material.picture.albedo.image=",
+            file,
+            " --method direct",
+        ]
+        .concat()
+    };
+    let pictures = [picture("sky.exr"), picture("picture.png")];
+    let [exr, png] = [0, 1].map(|i| pictures[i].split(' ').collect::<Vec<_>>());
+    let cases: [(&str, &[&str]); 9] = [
         ("small", &["--method", "direct"]),
         ("pixels", &["--method", "direct", "-D", "camera.resolution=[700,700]"]),
         ("triangles, direct", &[&["--method", "direct"][..], &fine].concat()),
         ("triangles, subsurface", &fine),
         ("cache", &["-D", "method.cache_samples=400000", "-D", "camera.resolution=[16,16]"]),
         ("photons", &["--method", "volume_path", "-D", "method.photons=80000", "-D", "camera.resolution=[16,16]"]),
+        ("picture, floats", &exr),
+        ("picture, codes", &png),
         ("sky", &["--method", "direct", "-D", "environment.image=sky.exr"]),
     ];
     for backend in Backend::ALL.into_iter().filter(|b| b.is_built_in()) {
