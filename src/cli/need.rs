@@ -43,8 +43,8 @@ const PER_PIXEL_OF_SKY: u64 = size_of::<Rgb>() as u64 + 4;
 const PER_PIXEL_OF_EXR: u64 = 3 * size_of::<Rgb>() as u64;
 /// Line by line, and turned the right way.
 const PER_PIXEL_OF_HDR: u64 = 2 * size_of::<Rgb>() as u64;
-/// While a picture on a surface is read: of PNG and JPEG codes beside the picture.
-const PER_TEXEL_OF_CODES: u64 = size_of::<Rgb>() as u64 + 12;
+/// While a picture on a surface is read from PNG or JPEG: codes and file beside the picture.
+const PER_TEXEL_OF_CODES: u64 = size_of::<Rgb>() as u64 + 8;
 /// Texture coordinates: as they are read, and as they are placed, beside the mesh [bytes/triangle].
 const UV: [u64; 2] = [72, 28];
 /// While an OBJ file is read: text, the reader's mesh and ours [bytes/triangle, bytes/vertex, and with normals bytes/triangle more].
@@ -121,8 +121,10 @@ pub fn of(prepared: &Prepared, window: Window, view: Option<View<'_>>) -> Need {
         _ => PER_PIXEL_OF_HDR,
     };
     let reading = prepared.file.environment.image.as_ref().map_or(0, |path| sky * per_pixel(path));
-    let texture = |t: &&Texture| t.bytes() as u64 / size_of::<Rgb>() as u64 * per_pixel(t.name().as_ref());
-    let reading_texture = need.environment + need.textures + textures.iter().map(texture).max().unwrap_or(0);
+    let beside = |t: &&Texture| {
+        t.bytes() as u64 / size_of::<Rgb>() as u64 * (per_pixel(t.name().as_ref()) - size_of::<Rgb>() as u64)
+    };
+    let reading_texture = need.environment + need.textures + textures.iter().map(beside).max().unwrap_or(0);
     need.peak = PROGRAM + reading.max(reading_texture).max(need.environment + need.textures + need.meshes + most);
     need
 }
