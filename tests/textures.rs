@@ -15,7 +15,7 @@ use marmor::query::{self, Backend};
 use marmor::render::{Aov, first_hit};
 use marmor::scene::{Orders, Scene, SceneFile};
 use refusals::failure;
-use rendering::{average, film, load_in};
+use rendering::{film, load_in};
 use std::f32::consts::PI;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -120,28 +120,51 @@ fn a_mirror_image_has_the_picture() {
     assert!((share(0) - 0.5).abs() < 0.1 && share(0) < 0.5 && share(1) > 0.5, "{} {}", share(0), share(1));
 }
 
+/// What a path samples and what it asks of lights are both of the point: under an even sky each is half of it.
+#[test]
+fn paths_go_on_by_the_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    save_exr(&checker(), folder.path(), "checker.exr");
+    let text = wall("{ image = \"checker.exr\" }").replace(SUN, "[environment]\nradiance = 1\n");
+    let scene = load_in(folder.path(), &text);
+    let render = |method: &dyn Fn() -> Image, what: &str| {
+        let image = method();
+        for (x, y) in (0..16).map(|i| (i % 4, i / 4)) {
+            let (found, right) = (middle(&image, x, y), square(x, y));
+            let off = (0..3).map(|c| (found[c] / right[c] - 1.0).abs()).fold(0.0, f32::max);
+            assert!(off < 0.05, "{what}: square {x},{y}: {found:?} for {right:?}");
+        }
+    };
+    render(&|| film(&Paths::new(&scene, None, 1).unwrap(), &scene, 256, 1, &mut []).image(), "path");
+    render(&|| film(&volume_path(&scene), &scene, 256, 1, &mut []).image(), "volume_path");
+    render(&|| film(&subsurface(&scene, 8), &scene, 256, 1, &mut []).image(), "subsurface");
+}
+
+/// A floor along the sun, which sees nothing but a wall, black to the left and white to the right.
 #[test]
 fn light_between_surfaces_has_the_picture_at_its_points() {
     let folder = tempfile::tempdir().unwrap();
-    // The halves: what faces the black one gets nothing back.
     save_exr(&Image::from_fn([64, 1], |x, _| Rgb::splat((x / 32) as f32)), folder.path(), "halves.exr");
     let text = |albedo: &str| {
         format!(
-            "unit = \"mm\"\n[camera]\nposition = [0, 0.5, 20]\nlook_at = [0, 0, 0]\nfov = 5\nresolution = [8, 1]\n{SUN}\
+            "unit = \"mm\"\n[camera]\nposition = [0, 20, 0.5]\nlook_at = [0, 0, 0.5]\nup = [0, 0, -1]\nfov = 4\nresolution = [2, 1]\n{SUN}\
              [[object]]\nname = \"wall\"\nshape = \"rectangle\"\ncentre = [0, 0, -1]\nedge_u = [4, 0, 0]\nedge_v = [0, 4, 0]\nmaterial = \"wall\"\n\
-             [[object]]\nshape = \"rectangle\"\ncentre = [0, 0, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 0, 1]\nmaterial = \"floor\"\n\
-             [material.floor]\ntype = \"diffuse\"\nalbedo = 0.5\n\
+             [[object]]\nshape = \"rectangle\"\ncentre = [0, 0, 0.3]\nedge_u = [0, 0, 1.2]\nedge_v = [2, 0, 0]\nmaterial = \"floor\"\n\
+             [material.floor]\ntype = \"diffuse\"\nalbedo = 0.1\n\
              [material.wall]\ntype = \"diffuse\"\nalbedo = {albedo}\n"
         )
     };
-    let mean = |albedo: &str| {
+    let sides = |albedo: &str| {
         let scene = load_in(folder.path(), &text(albedo));
-        average(&film(&Paths::new(&scene, Some(2), 1).unwrap(), &scene, 4096, 1, &mut []).image())
+        let image = film(&Paths::new(&scene, Some(2), 1).unwrap(), &scene, 16384, 1, &mut []).image();
+        [image.pixels[0][0], image.pixels[1][0]]
     };
-    let (halves, whole, none) = (mean("{ image = \"halves.exr\" }"), mean("1"), mean("0"));
-    assert!(none < 0.1 * whole, "{none} {whole}");
-    // By symmetry each half of the picture has as much light as the other: half of that of a white wall, to first order.
-    assert!((halves / whole - 0.5).abs() < 0.03, "{halves} of {whole}");
+    let ([left, right], white, black) = (sides("{ image = \"halves.exr\" }"), sides("1"), sides("0"));
+    assert_eq!(black, [0.0; 2]);
+    assert!((white[0] / white[1] - 1.0).abs() < 0.1, "{white:?}");
+    assert!(right > 1.5 * left && left > 0.0, "{left} {right}");
+    let share = (left + right) / (white[0] + white[1]);
+    assert!((share - 0.5).abs() < 0.05, "{share}");
 }
 
 #[test]
