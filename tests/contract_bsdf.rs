@@ -4,13 +4,21 @@
 use marmor::geometry::SurfacePoint;
 use marmor::math::{DVec3, Rgb, Vec3, hash, unit_f32};
 use marmor::optics::{reflectance, refract};
-use marmor::surface::{Boundary, Bsdf, Conductor, Lambertian, METALS, OrenNayar, Plastic, Reflectance};
+use marmor::surface::{
+    Boundary, Bsdf, Conductor, Lambertian, METALS, OrenNayar, Plastic, Reflectance, Texture, Textured, Wrap,
+};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 fn kinds() -> Vec<Box<dyn Bsdf>> {
     let albedo = Rgb([0.2, 0.5, 1.0]);
-    let mut kinds: Vec<Box<dyn Bsdf>> =
-        vec![Box::new(Lambertian { albedo }), Box::new(Boundary { eta: 1.5 }), Box::new(Boundary { eta: 0.7 })];
+    let one = Arc::new(Texture::new("one".into(), 1, vec![albedo], Wrap::Repeat));
+    let mut kinds: Vec<Box<dyn Bsdf>> = vec![
+        Box::new(Lambertian { albedo }),
+        Box::new(Textured { albedo: one }),
+        Box::new(Boundary { eta: 1.5 }),
+        Box::new(Boundary { eta: 0.7 }),
+    ];
     for roughness in [0.0, 0.15, 0.5, 1.0] {
         kinds.push(Box::new(OrenNayar::new(albedo, roughness)));
         kinds.push(Box::new(Plastic::new(albedo, 1.5, roughness)));
@@ -36,7 +44,7 @@ fn number(i: u64) -> f32 {
 
 fn point() -> SurfacePoint {
     let n = Vec3::new(0.6, 0.0, 0.8);
-    SurfacePoint { x: DVec3::ZERO, n_geometric: n, n, error: 0.0 }
+    SurfacePoint { x: DVec3::ZERO, n_geometric: n, n, uv: [0.0; 2], error: 0.0 }
 }
 
 /// A unit vector on the side of the normal.

@@ -120,6 +120,35 @@ fn a_film_that_was_asked_for_is_never_taken_away() {
     assert!(passes(folder, "x.film") > 3);
 }
 
+#[test]
+fn a_film_with_another_picture_on_a_surface_is_refused() {
+    let folder = folder(1.0);
+    let folder = folder.path();
+    let paint = |grey: f32| {
+        let image = Image::from_fn([4, 4], |_, _| Rgb::splat(grey));
+        save(&image, &folder.join("wood.exr"), &Metadata::default(), Default::default()).unwrap();
+    };
+    let wood = [
+        "-D",
+        "object.1.material=wood",
+        "-D",
+        "material.wood.type=diffuse",
+        "-D",
+        "material.wood.albedo.image=wood.exr",
+        "-q",
+    ];
+    let with = |more: &[&'static str]| [&wood[..], more].concat();
+    paint(0.5);
+    ok(folder, &with(&["-o", "a.film", "--spp", "2"]));
+    paint(0.6);
+    let resumed = render(folder, &with(&["-o", "a.film", "--spp", "4", "--resume"]));
+    refused(&resumed, &["a.film", "picture of material wood", "wood.exr", "hash"]);
+    let over = text(&render(folder, &with(&["-o", "wood.exr", "--spp", "2"])).stderr);
+    assert!(over.contains("would be written over the picture of material \"wood\""), "{over}");
+    paint(0.5);
+    ok(folder, &with(&["-o", "a.film", "--spp", "4", "--resume"]));
+}
+
 /// Files that are named in the scene are in the film: not by name, by what is in them.
 #[test]
 fn a_film_under_another_sky_is_refused() {

@@ -99,7 +99,7 @@ fn lamps_on_surfaces_are_worth_what_the_formula_says() {
             + &rectangle("lamp", lamp, [0.0, 0.0, 0.8], [-0.8, 0.0, 0.0], "lamp")
             + &material(keys)
             + &emissive("lamp", 3.0);
-        let at = SurfacePoint { x: DVec3::ZERO, n_geometric: Vec3::Y, n: Vec3::Y, error: 0.0 };
+        let at = SurfacePoint { x: DVec3::ZERO, n_geometric: Vec3::Y, n: Vec3::Y, error: 0.0, uv: [0.0; 2] };
         let wo = Vec3::from_array(eye.map(|v| v as f32)).normalize();
         let (mut sum, steps) = ([0.0; 3], 200);
         for i in 0..steps * steps {

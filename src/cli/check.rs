@@ -6,7 +6,7 @@ use super::need;
 use super::setup::{MethodArgs, prepare};
 use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
-use marmor::geometry::{Mended, load_obj, mended, write_obj};
+use marmor::geometry::{Mended, load_obj_with_uv, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
 use marmor::optics::{ChannelOptics, HalfSpace, Medium};
 use marmor::query;
@@ -107,7 +107,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
     }
     let mega = |bytes: u64| format!("{:.1} MB", bytes as f64 / 1e6);
     println!(
-        "\nmemory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, cache or photons {}; \
+        "\nmemory: some {} at the most: film {}, passes and pictures {}, meshes {}, trees and tables {}, environment {}, textures {}, cache or photons {}; \
          available {}",
         mega(need.peak),
         mega(need.film),
@@ -115,6 +115,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
         mega(need.meshes),
         mega(need.trees),
         mega(need.environment),
+        mega(need.textures),
         mega(need.pass),
         available.map_or("unknown".into(), |bytes| marmor::memory::gigabytes(bytes.into()))
     );
@@ -209,7 +210,7 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
     let mut all = Vec::new();
     for entry in &prepared.file.objects {
         let Geometry::Mesh(path) = &entry.geometry else { continue };
-        let mesh = load_obj(&scene_folder.join(path))?;
+        let mesh = load_obj_with_uv(&scene_folder.join(path))?;
         let (mesh, done) = mended(if entry.flip { mesh.flipped() } else { mesh });
         if done == Mended::default() {
             continue;

@@ -151,6 +151,12 @@ fn identity(prepared: &Prepared, backend: &str, window: Window) -> Identity {
         let what = format!("{}, {width}x{height} pixels, hash {:016x}", name.display(), image.fingerprint());
         facts.push(("picture of the environment".into(), what));
     }
+    facts.extend(scene.materials.iter().filter_map(|material| {
+        let texture = material.surface.bsdf.texture()?;
+        let [width, height] = texture.resolution();
+        let what = format!("{}, {width}x{height} pixels, hash {:016x}", texture.name(), texture.fingerprint());
+        Some((format!("picture of material {}", material.name), what))
+    }));
     facts.push(("centre of the scene".into(), scene.centre.to_string()));
     Identity(facts)
 }

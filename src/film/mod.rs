@@ -19,6 +19,7 @@ mod png_file;
 mod primaries;
 mod read;
 mod self_error;
+mod srgb_read;
 mod sums;
 mod variance;
 mod window;

@@ -1,7 +1,7 @@
 //! Reading a picture, whatever kind of file it is.
 
-use super::{FilePicture, Image, exr_read, hdr_read};
-use crate::Result;
+use super::{FilePicture, Image, exr_read, hdr_read, srgb_read};
+use crate::{Error, Result};
 use std::path::Path;
 
 impl FilePicture {
@@ -18,6 +18,31 @@ impl FilePicture {
             return hdr_read::read(path, layer);
         }
         exr_read::read(path, layer)
+    }
+
+    /// Reads a picture that is laid on a surface: PNG or JPEG, taken as sRGB and decoded to linear Rec. 709, alpha ignored; or
+    /// what [`FilePicture::read`] reads, which is linear.
+    ///
+    /// # Errors
+    /// As [`FilePicture::read`]; File for a JPEG in inks (CMYK).
+    pub fn read_texture(path: &Path, layer: Option<&str>) -> Result<Self> {
+        let png = match exr_read::first_bytes(path)?[..] {
+            [0x89, b'P', b'N', b'G'] => true,
+            [0xff, 0xd8, ..] => false,
+            [b'#', b'?', ..] | [0x76, 0x2f, 0x31, 0x01] => return Self::read(path, layer),
+            [] => return Err(Error::file(path, "read", "the file is empty")),
+            _ => {
+                let what = "it is none of PNG, JPEG, EXR and Radiance HDR; save it as one of them";
+                return Err(Error::file(path, "read", what));
+            }
+        };
+        match layer {
+            None => srgb_read::read(path, png),
+            Some(layer) => {
+                let kind = if png { "PNG" } else { "JPEG" };
+                Err(Error::file(path, "read", format!("it is a {kind} file, which has no layers, nor `{layer}`")))
+            }
+        }
     }
 }
 

@@ -161,7 +161,11 @@ pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
             faces.kept.iter().map(|&t| normals.triangles[t as usize].map(|triple| pick(t, triple))).collect();
         normals
     });
-    (ObjMesh { triangles, normals, ..mesh }, done)
+    let uv = mesh.uv.map(|uv| {
+        let of = |&t: &u32| uv[t as usize].map(|[a, b, c]| if turn[t as usize] { [a, c, b] } else { [a, b, c] });
+        faces.kept.iter().map(of).collect()
+    });
+    (ObjMesh { triangles, normals, uv, ..mesh }, done)
 }
 
 /// For each vertex the first one of its group at the same place.

@@ -11,11 +11,16 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Shading normals; `None` shades with the triangles' own.
     pub normals: Option<Normals>,
+    /// Texture coordinates of the corners of each triangle; `None` where nobody asks for them.
+    pub uv: Option<Vec<CornerUv>>,
     /// What rays are traced in, which decides how far from the surface they start.
     pub precision: Precision,
     /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
     pub groups: Vec<u32>,
 }
+
+/// Texture coordinates (u, v) of a triangle's three corners: u to the right in a picture, v upwards, 0 to 1 over all of it.
+pub type CornerUv = [[f32; 2]; 3];
 
 /// The numbers that rays are traced in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -57,6 +62,8 @@ pub struct SurfacePoint {
     pub n_geometric: Vec3,
     /// Unit normal for shading, in the same half space as `n_geometric`.
     pub n: Vec3,
+    /// Texture coordinates, v upwards; 0 where the mesh has none.
+    pub uv: [f32; 2],
     /// Bound of the rounding error of `x` and of a ray test against the triangle [unit].
     pub error: f64,
 }
@@ -116,6 +123,7 @@ impl Mesh {
             x: a * (1.0 - u - v) + b * u + c * v,
             n_geometric,
             n: self.shading_normal(triangle, u as f32, v as f32, n_geometric),
+            uv: self.uv_at(triangle, u as f32, v as f32),
             error: self.precision.error(largest),
         }
     }
@@ -136,10 +144,19 @@ impl Mesh {
         if n.dot(n_geometric) < 0.0 { -n } else { n }
     }
 
-    /// Memory of vertices, triangles and normals.
+    /// Interpolated texture coordinates; 0 without any.
+    #[inline]
+    fn uv_at(&self, triangle: u32, u: f32, v: f32) -> [f32; 2] {
+        let Some(all) = &self.uv else { return [0.0; 2] };
+        let [a, b, c] = all[triangle as usize];
+        std::array::from_fn(|k| a[k] * (1.0 - u - v) + b[k] * u + c[k] * v)
+    }
+
+    /// Memory of vertices, triangles, normals and texture coordinates.
     pub fn bytes(&self) -> usize {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(&*n.vectors) + size_of_val(&*n.triangles));
-        size_of_val(&*self.positions) + size_of_val(&*self.triangles) + normals
+        let uv = self.uv.as_ref().map_or(0, |uv| size_of_val(&**uv));
+        size_of_val(&*self.positions) + size_of_val(&*self.triangles) + normals + uv
     }
 
     /// A hash of every bit of the mesh.
@@ -153,7 +170,8 @@ impl Mesh {
             state = normals.vectors.iter().fold(hash_combine(state, 1), point);
             state = normals.triangles.iter().fold(state, index);
         }
-        state
+        let numbers = self.uv.iter().flatten().flatten().flatten();
+        numbers.fold(state, |state, x| hash_combine(state, x.to_bits().into()))
     }
 
     /// The box around all vertices [unit]; `None` without vertices.
@@ -216,7 +234,7 @@ mod tests {
     use super::*;
 
     fn point(n: Vec3) -> SurfacePoint {
-        SurfacePoint { x: DVec3::ZERO, n_geometric: Vec3::Z, n: n.normalize(), error: 0.0 }
+        SurfacePoint { x: DVec3::ZERO, n_geometric: Vec3::Z, n: n.normalize(), uv: [0.0; 2], error: 0.0 }
     }
 
     #[test]

@@ -13,8 +13,8 @@ use crate::math::DVec3;
 use crate::words::counted;
 
 /// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
-/// left out. Polygons are cut into triangles, concave ones and those with a hole too. Texture coordinates, vertex colours,
-/// weights, materials, smoothing groups and curves are not read; a missing MTL file is no error. What a user should hear of
+/// left out. Polygons are cut into triangles, concave ones and those with a hole too. Texture coordinates (but see
+/// [`load_obj_with_uv`]), vertex colours, weights, materials, smoothing groups and curves are not read; a missing MTL file is no error. What a user should hear of
 /// is in [`ObjMesh::remarks`]. A face has the file's normals only where all its corners have one.
 ///
 /// # Errors
@@ -22,13 +22,26 @@ use crate::words::counted;
 /// number, an index is 0 or of a vertex that does not exist, or a line is longer than 16 MiB; one that names the path
 /// if there are no faces. A Memory error, found while reading, if the mesh is more than what is available.
 pub fn load_obj(path: &Path) -> Result<ObjMesh> {
+    load(path, false)
+}
+
+/// As [`load_obj`], with texture coordinates of the faces that have some at all their corners. Such that are not there or no
+/// finite numbers count as missing.
+///
+/// # Errors
+/// As [`load_obj`].
+pub fn load_obj_with_uv(path: &Path) -> Result<ObjMesh> {
+    load(path, true)
+}
+
+fn load(path: &Path, uv: bool) -> Result<ObjMesh> {
     let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
     if !metadata.is_file() {
         let what = if metadata.is_dir() { "it is a folder" } else { "it is not a regular file" };
         return Err(Error::file(path, "read", format!("{what}; name an OBJ file")));
     }
     let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
-    parse(&mut ObjLines::new(BufReader::with_capacity(1 << 16, file)), path)
+    parse(&mut ObjLines::new(BufReader::with_capacity(1 << 16, file), uv), path)
 }
 
 /// Writes a mesh as OBJ, every digit of it.
@@ -39,18 +52,28 @@ pub fn write_obj(mesh: &ObjMesh, out: &mut dyn Write) -> std::io::Result<()> {
     for p in &mesh.positions {
         writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
     }
+    for [u, v] in mesh.uv.iter().flatten().flatten().flatten() {
+        writeln!(out, "vt {u:?} {v:?}")?;
+    }
     for n in mesh.normals.iter().flat_map(|n| &n.vectors) {
         writeln!(out, "vn {:?} {:?} {:?}", n.x, n.y, n.z)?;
     }
+    let mut written = 0;
     for (i, t) in mesh.triangles.iter().enumerate() {
-        let [a, b, c] = t.map(|v| v + 1);
-        match mesh.normals.as_ref().and_then(|n| n.triangles[i]) {
-            Some(n) => {
-                let [na, nb, nc] = n.map(|v| v + 1);
-                writeln!(out, "f {a}//{na} {b}//{nb} {c}//{nc}")?;
+        let normals = mesh.normals.as_ref().and_then(|n| n.triangles[i]);
+        let has_uv = mesh.uv.as_ref().is_some_and(|uv| uv[i].is_some());
+        write!(out, "f")?;
+        for corner in 0..3 {
+            write!(out, " {}", t[corner] + 1)?;
+            match (has_uv, normals.map(|n| n[corner] + 1)) {
+                (false, None) => {}
+                (false, Some(n)) => write!(out, "//{n}")?,
+                (true, None) => write!(out, "/{}", written + corner + 1)?,
+                (true, Some(n)) => write!(out, "/{}/{n}", written + corner + 1)?,
             }
-            None => writeln!(out, "f {a} {b} {c}")?,
         }
+        writeln!(out)?;
+        written += if has_uv { 3 } else { 0 };
     }
     Ok(())
 }
@@ -102,11 +125,12 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
     Ok(out)
 }
 
-/// The triangles of the faces, with the normals of those that have them.
+/// The triangles of the faces, with the normals and texture coordinates of those that have them.
 fn cut<R: std::io::BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> ObjMesh {
     let mut out = ObjMesh {
         positions: mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0], p[1], p[2])).collect(),
         normals: vectors(mesh, lines.has_normals()).map(|vectors| ObjNormals { vectors, triangles: Vec::new() }),
+        uv: lines.uv().filter(|uv| uv.is_used()).map(|_| Vec::new()),
         ..ObjMesh::default()
     };
     let mut polygon_lines = lines.polygon_lines().iter();
@@ -130,6 +154,9 @@ fn cut<R: std::io::BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> ObjMesh {
             let usable = |t: &[u32; 3]| has_normals && t.iter().all(|&i| normals.vectors[i as usize] != DVec3::ZERO);
             // tobj makes up an index where a corner has none.
             normals.triangles.extend(triangles.iter().map(|&t| Some(of(&mesh.normal_indices, t)).filter(usable)));
+        }
+        if let (Some(uv), Some(typed)) = (&mut out.uv, lines.uv()) {
+            uv.extend(triangles.iter().map(|t| typed.of(t.map(|i| start + i as usize))));
         }
         start += arity;
     }

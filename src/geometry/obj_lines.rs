@@ -1,6 +1,7 @@
 //! The lines of an OBJ file on their way to `tobj`: counted, so that a complaint can name one, and reduced to what we
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
+use super::CornerUv;
 use super::obj_remarks::{CALLS, CURVED, KNOWN, OddLines};
 use crate::words::either;
 use crate::{Error, memory};
@@ -10,11 +11,53 @@ use std::io::{self, BufRead, Read};
 /// normals. `cli/need.rs` tells it apart by what takes it.
 pub const LOADING_BYTES: usize = 265;
 
+/// The same of texture coordinates, where they are asked for: as typed, and of each corner.
+const UV_BYTES: usize = 72;
+
 /// Longer than any real line, polygons of a million corners included; keeps a binary file from being read as one.
 const MAX_LINE: usize = 1 << 24;
 
 /// This many vertices, normals or triangles are refused, so that indices stay below 2^32.
 const MAX_COUNT: usize = 1 << 31;
+
+/// Texture coordinates as they are typed. tobj, which refuses a file for one bad number, does not see them.
+#[derive(Default)]
+pub(super) struct TypedUv {
+    /// What is no finite number is NaN.
+    values: Vec<[f32; 2]>,
+    /// For each corner of each face the number of its coordinates, from 1; 0 of one without.
+    corners: Vec<u32>,
+}
+
+impl TypedUv {
+    /// Of the triangle whose corners have these places among those of all faces; `None` if one of them is without.
+    pub(super) fn of(&self, corners: [usize; 3]) -> Option<CornerUv> {
+        let at = |corner: usize| {
+            let uv = self.values.get((self.corners[corner] as usize).checked_sub(1)?)?;
+            uv.iter().all(|x| x.is_finite()).then_some(*uv)
+        };
+        Some([at(corners[0])?, at(corners[1])?, at(corners[2])?])
+    }
+
+    /// `vt u`, `vt u v` or `vt u v w`.
+    fn add(&mut self, text: &str) {
+        let mut numbers = text.split('#').next().unwrap_or_default().split_whitespace().skip(1);
+        let mut number = || numbers.next().map(|word| word.parse::<f64>().map_or(f32::NAN, |v| v as f32));
+        self.values.push([number().unwrap_or(f32::NAN), number().unwrap_or(0.0)]);
+    }
+
+    fn add_corner(&mut self, typed: Option<i64>) {
+        let count = self.values.len() as i64;
+        let number =
+            typed.map_or(0, |typed| if typed < 0 { count.saturating_add(typed).saturating_add(1) } else { typed });
+        self.corners.push(u32::try_from(number).unwrap_or(0));
+    }
+
+    /// Whether any corner has coordinates.
+    pub(super) fn is_used(&self) -> bool {
+        self.corners.iter().any(|&number| number > 0)
+    }
+}
 
 /// Hands on `v`, `vn` and `f` lines alone; indices come out absolute, checked, without texture coordinates.
 pub(super) struct ObjLines<R> {
@@ -34,6 +77,8 @@ pub(super) struct ObjLines<R> {
     forward: [Option<(usize, usize)>; 2],
     has_normals: Vec<bool>,
     polygon_lines: Vec<usize>,
+    /// Where they are asked for.
+    uv: Option<TypedUv>,
     ignored: usize,
     odd: OddLines,
     complaint: Option<(usize, String)>,
@@ -54,7 +99,8 @@ pub(super) fn shown(line: &str) -> String {
 }
 
 impl<R: BufRead> ObjLines<R> {
-    pub(super) fn new(source: R) -> Self {
+    /// With `uv` texture coordinates are kept.
+    pub(super) fn new(source: R, uv: bool) -> Self {
         Self {
             source,
             out: String::new(),
@@ -67,6 +113,7 @@ impl<R: BufRead> ObjLines<R> {
             forward: [None; 2],
             has_normals: Vec::new(),
             polygon_lines: Vec::new(),
+            uv: uv.then(TypedUv::default),
             ignored: 0,
             odd: OddLines::default(),
             complaint: None,
@@ -105,6 +152,11 @@ impl<R: BufRead> ObjLines<R> {
         &self.polygon_lines
     }
 
+    /// Texture coordinates, where they are asked for.
+    pub(super) fn uv(&self) -> Option<&TypedUv> {
+        self.uv.as_ref()
+    }
+
     /// What a user should hear of who expects the file to be shown as it is.
     pub(super) fn remarks(&self) -> impl Iterator<Item = String> {
         let unused = (!self.has_normals.contains(&true)).then_some(self.normals);
@@ -122,7 +174,8 @@ impl<R: BufRead> ObjLines<R> {
             return true;
         }
         self.look_at = 2 * count;
-        let needed = count as u128 * LOADING_BYTES as u128;
+        let bytes = LOADING_BYTES + if self.uv.is_some() { UV_BYTES } else { 0 };
+        let needed = count as u128 * bytes as u128;
         let what = format!("a mesh of {count} or more vertices or triangles");
         let checked = memory::require(needed, memory::available(), &what, "use a coarser mesh");
         self.out_of_memory = checked.err();
@@ -220,6 +273,15 @@ impl<R: BufRead> ObjLines<R> {
             let keyword = words.split(u8::is_ascii_whitespace).next().unwrap_or_default();
             match keyword {
                 b"l" | b"p" => self.ignored += 1,
+                b"vt" if self.uv.is_some() => {
+                    if let Some(uv) = &mut self.uv {
+                        uv.add(&String::from_utf8_lossy(words));
+                        let count = uv.values.len();
+                        if !self.fits(count) {
+                            return Ok(());
+                        }
+                    }
+                }
                 // `fo` is the face of version 2.
                 b"v" | b"vn" | b"f" | b"fo" => {
                     // Anything but UTF-8 is no number; the replacement character makes tobj say so.
@@ -302,11 +364,11 @@ impl<R: BufRead> ObjLines<R> {
                 None | Some("") => Ok(None),
                 Some(number) => number.parse::<i64>().map(Some).map_err(|_| malformed()),
             };
-            let (v, _, vn) = (part()?.ok_or_else(malformed)?, part()?, part()?);
+            let (v, vt, vn) = (part()?.ok_or_else(malformed)?, part()?, part()?);
             if parts.next().is_some() {
                 return Err(malformed());
             }
-            Ok((v, vn))
+            Ok((v, vt, vn))
         });
         let corners = corners.collect::<Result<Vec<_>, String>>()?;
         if corners.is_empty() {
@@ -316,10 +378,11 @@ impl<R: BufRead> ObjLines<R> {
             self.ignored += 1;
             return Ok(());
         }
-        let with_normals = corners.iter().all(|(_, vn)| vn.is_some());
+        let with_normals = corners.iter().all(|(_, _, vn)| vn.is_some());
         let mut out = std::mem::take(&mut self.out);
         out.push('f');
-        for (v, vn) in &corners {
+        for (v, vt, vn) in &corners {
+            self.uv.iter_mut().for_each(|uv| uv.add_corner(*vt));
             let v = self.resolve(0, *v)?;
             out.push_str(&format!(" {v}"));
             if let Some(vn) = *vn
@@ -333,7 +396,7 @@ impl<R: BufRead> ObjLines<R> {
         self.out = out;
         self.triangles += corners.len() - 2;
         self.has_normals.push(with_normals);
-        if !with_normals && corners.iter().any(|(_, vn)| vn.is_some()) {
+        if !with_normals && corners.iter().any(|(_, _, vn)| vn.is_some()) {
             self.odd.half_shaded.count(|| (), self.line);
         }
         if corners.len() > 3 {

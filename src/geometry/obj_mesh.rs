@@ -3,7 +3,7 @@
 
 use std::collections::HashMap;
 
-use super::{Mesh, Normals};
+use super::{CornerUv, Mesh, Normals};
 use crate::math::{Aabb, DAffine3, DVec3, Vec3};
 
 /// What an OBJ file or a shape holds, before any transform.
@@ -15,6 +15,8 @@ pub struct ObjMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Normals, where there are any.
     pub normals: Option<ObjNormals>,
+    /// Texture coordinates, where there are any: one entry for each triangle, `None` of one without.
+    pub uv: Option<Vec<Option<CornerUv>>>,
     /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
     pub groups: Vec<u32>,
     /// What a user should hear of: what the file has besides, and what is odd about its polygons.
@@ -41,12 +43,18 @@ impl ObjMesh {
         self.normals.as_ref().map_or(0, |n| n.triangles.iter().filter(|t| t.is_none()).count())
     }
 
+    /// Triangles that lack texture coordinates.
+    pub fn without_uv(&self) -> usize {
+        self.uv.as_ref().map_or(self.triangles.len(), |uv| uv.iter().filter(|t| t.is_none()).count())
+    }
+
     /// All of these as one mesh, each with whether it is closed. Closed ones keep their corners for themselves: where they touch, faces of two
     /// parts lie in each other. Open ones hang together where their corners are at exactly one place, as two half shells do at their rim.
     pub fn joined(parts: Vec<(Self, bool)>) -> Self {
         let mut all = Self::default();
         let shaded = parts.iter().any(|(mesh, _)| mesh.normals.is_some());
-        let mut normals = ObjNormals::default();
+        let textured = parts.iter().any(|(mesh, _)| mesh.uv.is_some());
+        let (mut normals, mut uv) = (ObjNormals::default(), Vec::new());
         for (number, (mesh, closed)) in (1..).zip(parts) {
             let (base, first) = (all.positions.len() as u32, normals.vectors.len() as u32);
             all.groups.extend(vec![if closed { number } else { 0 }; mesh.positions.len()]);
@@ -60,8 +68,13 @@ impl ObjMesh {
                 }
                 None => normals.triangles.resize(all.triangles.len(), None),
             }
+            if textured {
+                uv.extend(mesh.uv.into_iter().flatten());
+                uv.resize(all.triangles.len(), None);
+            }
         }
         all.normals = shaded.then_some(normals);
+        all.uv = textured.then_some(uv);
         all
     }
 
@@ -100,6 +113,7 @@ impl ObjMesh {
         if let Some(normals) = &mut self.normals {
             normals.triangles.iter_mut().flatten().for_each(|t| t.swap(1, 2));
         }
+        self.uv.iter_mut().flatten().flatten().for_each(|t| t.swap(1, 2));
     }
 
     /// For each vertex the first one at exactly the same position.
@@ -152,6 +166,7 @@ impl ObjMesh {
             positions: self.positions.iter().map(|p| *p - centre).collect(),
             triangles: self.triangles.clone(),
             groups: self.groups.clone(),
+            uv: self.uv.as_ref().map(|uv| uv.iter().map(|t| t.unwrap_or_default()).collect()),
             ..Mesh::default()
         };
         mesh.normals = self.normals.as_ref().map(|normals| {

@@ -1,6 +1,6 @@
 //! Simple shapes as triangles, for lights, floors and furnaces.
 
-use super::{ObjMesh, ObjNormals};
+use super::{CornerUv, ObjMesh, ObjNormals};
 use crate::math::DVec3;
 
 /// A parallelogram with corners `centre` ± `edge_u` ± `edge_v`, both half edges; its outside is the side that
@@ -16,6 +16,11 @@ pub fn rectangle(centre: DVec3, edge_u: DVec3, edge_v: DVec3) -> ObjMesh {
         triangles: vec![[0, 1, 2], [0, 2, 3]],
         ..ObjMesh::default()
     }
+}
+
+/// Texture coordinates of [`rectangle`]: u from 0 to 1 along `edge_u`, v along `edge_v`.
+pub fn rectangle_uv() -> Vec<Option<CornerUv>> {
+    vec![Some([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]), Some([[0.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]
 }
 
 /// A sphere of `rings` bands from pole to pole (along y) and `segments` around, rings >= 2, segments >= 3, with the
@@ -45,9 +50,27 @@ pub fn sphere(centre: DVec3, radius: f64, rings: u32, segments: u32) -> ObjMesh 
         positions: vectors.iter().map(|n| centre + *n * radius).collect(),
         normals: Some(ObjNormals { triangles: triangles.iter().copied().map(Some).collect(), vectors }),
         triangles,
-        groups: Vec::new(),
-        remarks: Vec::new(),
+        ..ObjMesh::default()
     }
+}
+
+/// Texture coordinates of [`sphere`] with as many `rings` and `segments`: longitude to the right as seen from outside, 0 and 1 at
+/// -z, 1/2 at +z, and latitude from 0 at -y to 1 at +y. Where no edge lies at -z, triangles there reach a little beyond 0 or 1.
+pub fn sphere_uv(rings: u32, segments: u32) -> Vec<Option<CornerUv>> {
+    let longitude = |j: f64| 0.75 - j / f64::from(segments);
+    let mut out = Vec::with_capacity(2 * (rings as usize - 1) * segments as usize);
+    for j in 0..segments {
+        let middle = longitude(f64::from(j) + 0.5);
+        let u = |k: f64| (longitude(f64::from(j) + k) - middle.floor()) as f32;
+        let at = |i: u32, k: f64| [u(k), (1.0 - f64::from(i) / f64::from(rings)) as f32];
+        out.push(Some([at(0, 0.5), at(1, 1.0), at(1, 0.0)]));
+        for i in 1..rings - 1 {
+            out.push(Some([at(i, 0.0), at(i, 1.0), at(i + 1, 1.0)]));
+            out.push(Some([at(i, 0.0), at(i + 1, 1.0), at(i + 1, 0.0)]));
+        }
+        out.push(Some([at(rings, 0.5), at(rings - 1, 0.0), at(rings - 1, 1.0)]));
+    }
+    out
 }
 
 #[cfg(test)]
@@ -78,6 +101,26 @@ mod tests {
         }
         assert!((volume(&sphere(DVec3::splat(5.0), 2.0, 64, 128)) / ideal - 1.0).abs() < 0.01);
         assert!((volume(&sphere(DVec3::ZERO, 2.0, 2, 3))) > 0.0);
+    }
+
+    /// At each corner the coordinates are longitude and latitude of its place, and all of them from 0 to 1.
+    #[test]
+    fn coordinates_of_a_sphere_are_longitude_and_latitude() {
+        for (rings, segments) in [(8, 16), (2, 3), (5, 7)] {
+            let (mesh, uv) = (sphere(DVec3::ZERO, 2.0, rings, segments), sphere_uv(rings, segments));
+            assert_eq!(uv.len(), mesh.triangles.len());
+            for (triangle, uv) in mesh.triangles.iter().zip(uv.into_iter().flatten()) {
+                for (i, [u, v]) in triangle.iter().zip(uv) {
+                    let [u, v] = [u, v].map(f64::from);
+                    let (latitude, longitude) = ((v - 0.5) * std::f64::consts::PI, (u - 0.5) * std::f64::consts::TAU);
+                    let at =
+                        DVec3::new(latitude.cos() * longitude.sin(), latitude.sin(), latitude.cos() * longitude.cos());
+                    assert!((at * 2.0).distance(mesh.positions[*i as usize]) < 1e-5, "{u} {v}");
+                    let beyond = if segments % 4 == 0 { 1e-6 } else { 0.5 / f64::from(segments) };
+                    assert!(u >= -beyond && u <= 1.0 + beyond, "{u}");
+                }
+            }
+        }
     }
 
     #[test]

@@ -4,17 +4,18 @@ use super::glossy::Glossy;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, KnownLights, Part, View, camera_hits};
 use crate::error::Result;
+use crate::geometry::SurfacePoint;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::scene::{Scene, Surface};
+use crate::surface::Lambertian;
 use crate::tally::Tally;
 
 /// Opaque surfaces under the scene's lights, without interreflection. A translucent surface is shown as
 /// a Lambertian one with its model's diffuse reflectance: a preview.
 pub struct Direct {
     light: DirectLight,
-    /// Albedo of each object's surface.
-    albedo: Vec<Rgb>,
+    albedo: Albedos,
     glossy: Option<Glossy>,
 }
 
@@ -25,19 +26,36 @@ impl Direct {
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, light_samples: u32) -> Result<Self> {
         let light = DirectLight { lights: Lights::new(scene), samples: light_samples };
-        Ok(Self { light, albedo: lambertian_albedos(scene)?, glossy: Glossy::new(scene) })
+        Ok(Self { light, albedo: Albedos::new(scene)?, glossy: Glossy::new(scene) })
     }
 }
 
-/// The Lambertian albedo that stands for each object's surface.
-pub(super) fn lambertian_albedos(scene: &Scene) -> Result<Vec<Rgb>> {
-    let albedo = |surface: &Surface| {
-        Ok(match &surface.inside {
-            Some(t) => t.build()?.total(),
-            None => surface.bsdf.albedo(),
-        })
+/// Lambertian surfaces that stand for translucent ones, of the reflectance of their models; one for each object, `None` of others.
+pub(super) fn stand_ins(scene: &Scene) -> Result<Vec<Option<Lambertian>>> {
+    let of = |surface: &Surface| {
+        let Some(inside) = &surface.inside else { return Ok(None) };
+        Ok(Some(Lambertian { albedo: inside.build()?.total() }))
     };
-    scene.objects.iter().map(|o| albedo(&scene.materials[o.material].surface)).collect()
+    scene.objects.iter().map(|o| of(&scene.materials[o.material].surface)).collect()
+}
+
+/// The Lambertian albedo of all surfaces, or of what stands for them.
+pub(super) struct Albedos(Vec<Option<Lambertian>>);
+
+impl Albedos {
+    /// # Errors
+    /// As [`stand_ins`].
+    pub(super) fn new(scene: &Scene) -> Result<Self> {
+        stand_ins(scene).map(Self)
+    }
+
+    /// At a point of the surface of `object`.
+    pub(super) fn at(&self, scene: &Scene, object: u32, at: &SurfacePoint) -> Rgb {
+        match &self.0[object as usize] {
+            Some(stand_in) => stand_in.albedo,
+            None => scene.surface(object).bsdf.albedo_at(at),
+        }
+    }
 }
 
 impl Integrator for Direct {
@@ -57,7 +75,7 @@ impl Integrator for Direct {
                 let at = view.point(hit, ray.ray.direction);
                 let mut stream = ray.stream;
                 emitted(view.scene, hit, ray.ray.direction)
-                    + self.light.reflected(view, &at, self.albedo[hit.mesh as usize], &mut stream, tally)
+                    + self.light.reflected(view, &at, self.albedo.at(view.scene, hit.mesh, &at), &mut stream, tally)
             });
         }
     }

@@ -1,6 +1,6 @@
 //! Path tracing over opaque surfaces and through clear bodies: light from lamps and environment by any number of reflections.
 
-use super::direct::lambertian_albedos;
+use super::direct::stand_ins;
 use super::parts::clear_bodies;
 use super::shade::DirectLight;
 use super::volume_path::{Scratch, VolumePath};
@@ -9,7 +9,6 @@ use crate::error::Result;
 use crate::light::Lights;
 use crate::math::Rgb;
 use crate::scene::Scene;
-use crate::surface::Lambertian;
 use crate::tally::Tally;
 use crate::words::counted;
 
@@ -32,12 +31,9 @@ impl Path {
     /// # Errors
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, bounces: Option<u32>, seed: u64) -> Result<Self> {
-        let stand_in =
-            |(object, albedo): (u32, Rgb)| scene.surface(object).is_translucent().then_some(Lambertian { albedo });
-        let stand_ins = (0..).zip(lambertian_albedos(scene)?).map(stand_in).collect();
         let most = bounces.unwrap_or(MOST_SURFACES).min(MOST_SURFACES);
         let light = DirectLight { lights: Lights::new(scene), samples: 1 };
-        Ok(Self { paths: VolumePath::over_surfaces(scene, stand_ins, most, seed), light, bounces })
+        Ok(Self { paths: VolumePath::over_surfaces(scene, stand_ins(scene)?, most, seed), light, bounces })
     }
 }
 

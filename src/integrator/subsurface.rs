@@ -1,6 +1,6 @@
 //! Translucent surfaces: light gathered from a cache of transmitted-light samples, leaving through the boundary.
 
-use super::direct::lambertian_albedos;
+use super::direct::Albedos;
 use super::glossy::Glossy;
 use super::indirect::{Indirect, OVER};
 use super::parts::{clear_bodies, of_cache};
@@ -34,7 +34,7 @@ const TAKEN_PER_SAMPLE: u64 = 150;
 pub struct Subsurface {
     options: SubsurfaceOptions,
     light: DirectLight,
-    albedo: Vec<Rgb>,
+    albedo: Albedos,
     /// Opaque surfaces that are not Lambertian, where no paths go on.
     glossy: Option<Glossy>,
     /// One for each object; `None` where it is not translucent or has no area.
@@ -76,7 +76,7 @@ impl Subsurface {
         Ok(Self {
             options,
             light: DirectLight { lights, samples: options.light_samples },
-            albedo: lambertian_albedos(scene)?,
+            albedo: Albedos::new(scene)?,
             glossy: if indirect.is_none() { Glossy::new(scene) } else { None },
             plans,
             walked,
@@ -165,7 +165,8 @@ impl Subsurface {
                 _ if inside => indirect.paths.seen_from_inside(view, ray, &mut paths, tally),
                 None => self.light.lights.environment(ray.ray.direction),
                 Some(hit) if view.scene.surface(hit.mesh).is_lambertian() => {
-                    let (at, albedo) = (view.point(hit, ray.ray.direction), self.albedo[hit.mesh as usize]);
+                    let at = view.point(hit, ray.ray.direction);
+                    let albedo = self.albedo.at(view.scene, hit.mesh, &at);
                     let straight = self.light.reflected(view, &at, albedo, &mut ray.stream.clone(), tally);
                     straight + indirect.paths.reflected(view, ray, hit, &mut paths, tally)
                 }
@@ -207,7 +208,7 @@ impl Subsurface {
         let object = hit.mesh as usize;
         let Some(plan) = &self.plans[object] else {
             return emitted(view.scene, hit, ray.ray.direction)
-                + self.light.reflected(view, &at, self.albedo[object], &mut stream, tally);
+                + self.light.reflected(view, &at, self.albedo.at(view.scene, hit.mesh, &at), &mut stream, tally);
         };
         if !self.options.specular {
             return inside;
@@ -231,8 +232,8 @@ impl Subsurface {
             None => self.light.lights.environment(direction),
             Some(hit) => {
                 let there = view.point(&hit, direction);
-                emitted(view.scene, &hit, direction)
-                    + self.light.reflected(view, &there, self.albedo[hit.mesh as usize], stream, tally)
+                let albedo = self.albedo.at(view.scene, hit.mesh, &there);
+                emitted(view.scene, &hit, direction) + self.light.reflected(view, &there, albedo, stream, tally)
             }
         }
     }

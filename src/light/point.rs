@@ -27,7 +27,7 @@ impl PointLight {
             _ => return None,
         };
         let n = axis.as_vec3();
-        let at = SurfacePoint { x, n_geometric: n, n, error: 0.0 };
+        let at = SurfacePoint { x, n_geometric: n, n, uv: [0.0; 2], error: 0.0 };
         let bodies = scene.bodies.iter().flatten().map(|body| body.bounds);
         let square = |bounds: Aabb| bounds.centre().distance_squared(x);
         let nearest = bodies.map(square).fold(f64::INFINITY, f64::min);

@@ -7,7 +7,7 @@ use crate::integrator::{Local, LocalShape, View};
 use crate::math::Rgb;
 use crate::optics::{ChannelOptics, HalfSpace};
 use crate::query::{Hit, Ray};
-use crate::scene::{Scene, Surface};
+use crate::scene::Scene;
 use rayon::prelude::*;
 
 /// Rays to each side of a square over a pixel.
@@ -42,7 +42,9 @@ pub fn first_hit(view: View<'_>, window: Window, what: Aov) -> Image {
         let hit = view.rays.closest(&ray)?;
         let mesh = &view.scene.objects[hit.mesh as usize].mesh;
         match what {
-            Aov::Albedo => Some(albedo[hit.mesh as usize]),
+            Aov::Albedo => Some(albedo[hit.mesh as usize].unwrap_or_else(|| {
+                view.scene.surface(hit.mesh).bsdf.albedo_at(&mesh.point(hit.triangle, hit.u, hit.v))
+            })),
             Aov::Normal => {
                 let at = mesh.point(hit.triangle, hit.u, hit.v).facing(-ray.direction);
                 Some(Rgb(at.normal_seen_from(-ray.direction).to_array()))
@@ -118,13 +120,12 @@ fn validity(view: View<'_>, (shape, curvature): &Bent, hit: &Hit) -> Rgb {
     }
 }
 
-fn albedos(scene: &Scene) -> Vec<Rgb> {
-    let of = |object: &crate::scene::Object| match &scene.materials[object.material].surface {
-        Surface { inside: None, bsdf, .. } => bsdf.albedo(),
-        Surface { inside: Some(t), .. } => {
-            let (half_space, optics) = (HalfSpace::new(t.medium.eta.into()), ChannelOptics::of(&t.medium));
-            Rgb::from_fn(|c| half_space.reflectance(optics[c].absorbed_prime) as f32)
-        }
+/// Of each translucent object; others have the albedo of their surface at each point.
+fn albedos(scene: &Scene) -> Vec<Option<Rgb>> {
+    let of = |object: u32| {
+        let t = scene.surface(object).inside.as_ref()?;
+        let (half_space, optics) = (HalfSpace::new(t.medium.eta.into()), ChannelOptics::of(&t.medium));
+        Some(Rgb::from_fn(|c| half_space.reflectance(optics[c].absorbed_prime) as f32))
     };
-    scene.objects.iter().map(of).collect()
+    (0..scene.objects.len() as u32).map(of).collect()
 }

@@ -113,7 +113,7 @@ impl SceneFile {
         root
     }
 
-    /// Every file that the scene names, with what it is: meshes once each, the picture of the environment.
+    /// Every file that the scene names, with what it is: meshes once each, the picture of the environment, those of materials.
     pub fn inputs(&self) -> Vec<(String, PathBuf)> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let mut seen = HashSet::new();
@@ -122,7 +122,11 @@ impl SceneFile {
             _ => None,
         });
         let sky = self.environment.image.iter().map(|path| ("the picture of [environment]".to_string(), path));
-        let all = meshes.chain(sky).map(|(what, path)| (what, folder.join(path)));
+        let pictures = self.materials.iter().filter_map(|material| {
+            let texture = material.albedo_image.as_ref()?;
+            Some((format!("the picture of material {:?}", material.name), &texture.image))
+        });
+        let all = meshes.chain(sky).chain(pictures).map(|(what, path)| (what, folder.join(path)));
         all.filter(|(_, path)| seen.insert(path.clone())).collect()
     }
 

@@ -1,17 +1,19 @@
 //! The way from the file as typed to the checked world: meshes read, placed and recentred in f64, then rounded.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::file::SceneFile;
 use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
 use super::{
-    Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets, warnings,
+    Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets,
+    textures, warnings,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, Solid, examine, load_obj, mended, rectangle, sphere,
+    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, Solid, examine, load_obj, load_obj_with_uv, mended,
+    rectangle, rectangle_uv, sphere, sphere_uv,
 };
 use crate::math::{Aabb, DVec3};
 use crate::memory;
@@ -36,8 +38,12 @@ impl Scene {
         let mut said = Vec::new();
         let folder = file.path.parent().unwrap_or(Path::new(""));
         let environment = file.environment.load(folder, &mut said)?;
+        let pictures = textures::load(file.materials.iter().map(|m| m.albedo_image.as_ref()), folder, &mut said)?;
         let placed = meshes(file, folder, repair, &mut said)?;
-        let (materials, of_objects) = sheets::materials(file, &mut said)?;
+        let (mut materials, of_objects) = sheets::materials(file, &mut said)?;
+        for (material, albedo) in materials.iter_mut().zip(pictures) {
+            material.surface = albedo.map_or_else(|| material.surface.clone(), Surface::textured);
+        }
         let translucent = |entry: &ObjectEntry| file.materials[entry.material].surface.is_translucent();
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
@@ -179,12 +185,15 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
         Geometry::Mesh(path) => Some(folder.join(path)),
         _ => None,
     };
+    let has_picture = |entry: &ObjectEntry| file.materials[entry.material].albedo_image.is_some();
+    let with_uv: HashSet<PathBuf> =
+        file.objects.iter().filter(|entry| has_picture(entry)).filter_map(path_of).collect();
     let mut uses: HashMap<PathBuf, usize> = HashMap::new();
     file.objects.iter().filter_map(path_of).for_each(|path| *uses.entry(path).or_default() += 1);
     let mut out = Vec::with_capacity(file.objects.len());
     let mut unasked = 0;
     for entry in &file.objects {
-        let mesh = match &entry.geometry {
+        let mut mesh = match &entry.geometry {
             Geometry::Rectangle { centre, edge_u, edge_v } => rectangle(*centre, *edge_u, *edge_v),
             Geometry::Sphere { centre, radius, rings, segments } => {
                 let triangles = 2 * u128::from(rings - 1) * u128::from(*segments);
@@ -201,7 +210,8 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                 let path = folder.join(path);
                 if !read.contains_key(&path) {
                     let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
-                    let mesh = load_obj(&path).map_err(within)?;
+                    let load = if with_uv.contains(&path) { load_obj_with_uv } else { load_obj };
+                    let mesh = load(&path).map_err(within)?;
                     said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
                     read.insert(path.clone(), mesh);
                 }
@@ -212,9 +222,38 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                 mesh.unwrap_or_default()
             }
         };
+        mesh.uv = match &entry.geometry {
+            _ if !has_picture(entry) => None,
+            Geometry::Rectangle { .. } => Some(rectangle_uv()),
+            Geometry::Sphere { rings, segments, .. } => Some(sphere_uv(*rings, *segments)),
+            Geometry::Mesh(_) => mesh.uv,
+        };
+        need_uv(file, entry, &mesh)?;
         out.push(sheets::body(entry, place(entry, mesh, repair, said), said)?);
     }
     Ok(out)
+}
+
+/// Refuses an object that has a picture and no coordinates for it.
+fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> {
+    let (material, all) = (&file.materials[entry.material], mesh.triangles.len());
+    let without = if material.albedo_image.is_some() { mesh.without_uv() } else { 0 };
+    if without == 0 {
+        return Ok(());
+    }
+    let mesh = match &entry.geometry {
+        Geometry::Mesh(path) => path.display().to_string(),
+        _ => "its shape".into(),
+    };
+    Err(Error::scene(format!(
+        "{}: object {:?}: its material {:?} is a picture, but {without} of {} of {mesh} {} no texture coordinates; export them \
+         (`vt`, at each corner of each face), or give the object another material",
+        entry.at,
+        entry.name,
+        material.name,
+        counted(all, "triangle", "triangles"),
+        either(without, "has", "have")
+    )))
 }
 
 fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<String>) -> ObjMesh {

@@ -2,7 +2,7 @@
 
 use super::tree::{Fields, Node};
 use super::values::{self, RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
-use super::{Dielectric, Emission, Surface, Translucent, opaque};
+use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, opaque, textures};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
@@ -15,6 +15,8 @@ pub struct MaterialEntry {
     pub name: String,
     /// The kind and its numbers.
     pub surface: Surface,
+    /// The picture that its albedo is, of a diffuse one; [`Self::surface`] is white then.
+    pub albedo_image: Option<TextureEntry>,
     /// File and line, for messages.
     pub at: String,
     /// What is wrong with it unless each of its objects has a `thickness`.
@@ -36,10 +38,14 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             "\"translucent\", \"dielectric\", \"diffuse\", \"plastic\", \"conductor\" or \"emissive\"",
             Node::text,
         )?;
-        let mut without_thickness = None;
+        let (mut without_thickness, mut albedo_image) = (None, None);
+        textures::refuse_elsewhere(&m, (kind == "diffuse").then_some("albedo"))?;
         let surface = match kind {
             "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), &mut without_thickness)?,
-            "diffuse" => opaque::diffuse(&m)?,
+            "diffuse" => {
+                albedo_image = textures::read(&m, "albedo")?;
+                opaque::diffuse(&m, albedo_image.is_some())?
+            }
             "conductor" => opaque::conductor(&m)?,
             "plastic" => opaque::plastic(&m)?,
             "emissive" => {
@@ -55,7 +61,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),
         };
-        Ok(MaterialEntry { name: name.to_string(), surface, at: m.at(), without_thickness })
+        Ok(MaterialEntry { name: name.to_string(), surface, albedo_image, at: m.at(), without_thickness })
     });
     entries.collect()
 }

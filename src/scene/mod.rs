@@ -25,6 +25,7 @@ mod options;
 mod precision;
 mod seams;
 mod sheets;
+mod textures;
 mod tree;
 mod untraceable;
 mod values;
@@ -44,6 +45,7 @@ pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{
     EntrySampling, Estimator, FilterName, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread,
 };
+pub use textures::TextureEntry;
 pub use walkable::ExitanceBy;
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
 

@@ -24,9 +24,18 @@ fn roughness(m: &Fields<'_>, default: f64) -> Result<f32> {
     Ok(typed.unwrap_or(default) as f32)
 }
 
-pub(super) fn diffuse(m: &Fields<'_>) -> Result<Surface> {
+/// `has_picture`: its albedo is one, and white until that is read.
+pub(super) fn diffuse(m: &Fields<'_>, has_picture: bool) -> Result<Surface> {
     m.only("a diffuse material", &["type", "albedo", "roughness"])?;
-    let (albedo, roughness) = (share(m, "albedo")?, roughness(m, 0.0)?);
+    let expected = "one number or three from 0 to 1, or { image = \"FILE\" }";
+    let typed = |n: &Node| colour(n, |v| (0.0..=1.0).contains(&v));
+    let albedo = if has_picture { Rgb::WHITE } else { rgb(m.need("albedo", expected, typed)?) };
+    let roughness = roughness(m, 0.0)?;
+    if has_picture && roughness > 0.0 {
+        return Err(
+            m.error_at("roughness", "stands beside a picture; a rough surface has one albedo: remove one of them")
+        );
+    }
     Ok(if roughness == 0.0 {
         Surface::diffuse(albedo)
     } else {

@@ -266,6 +266,16 @@ impl<'a> Fields<'a> {
         self.node(key).is_some()
     }
 
+    /// Whether there is a table under `key`.
+    pub(super) fn is_table(&self, key: &str) -> bool {
+        self.node(key).is_some_and(|node| matches!(node.value, Value::Table(_)))
+    }
+
+    /// All keys, in the order of the file.
+    pub(super) fn keys(&self) -> impl Iterator<Item = &'a str> {
+        self.entries.iter().map(|(key, _)| key.as_str())
+    }
+
     /// The value of `key` where `convert` takes it; `expected` says what it takes.
     pub(super) fn get<T>(
         &self,

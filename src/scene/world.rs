@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
-use crate::surface::{Boundary, Bsdf, Lambertian};
+use crate::surface::{Boundary, Bsdf, Lambertian, Texture, Textured};
 use std::sync::Arc;
 
 /// A scene whose numbers have been checked.
@@ -109,6 +109,11 @@ impl Surface {
     /// An opaque surface of any kind.
     pub fn opaque(bsdf: Arc<dyn Bsdf>) -> Self {
         Self { bsdf, emission: None, inside: None, clear: None }
+    }
+
+    /// Lambertian, both sides alike, with a picture for albedo: of objects with texture coordinates.
+    pub fn textured(albedo: Arc<Texture>) -> Self {
+        Self { bsdf: Arc::new(Textured { albedo }), emission: None, inside: None, clear: None }
     }
 
     /// A lamp, which reflects nothing.

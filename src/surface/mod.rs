@@ -7,6 +7,8 @@ mod lambertian;
 mod microfacets;
 mod oren_nayar;
 mod plastic;
+mod texture;
+mod textured;
 
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
@@ -15,6 +17,9 @@ pub use conductor::{Conductor, METALS, Reflectance};
 pub use lambertian::Lambertian;
 pub use oren_nayar::OrenNayar;
 pub use plastic::Plastic;
+use std::sync::Arc;
+pub use texture::{Texture, Wrap};
+pub use textured::Textured;
 
 /// Reflection and transmission at a point of a surface. Directions are unit vectors that lead away from it: `wo` to where light
 /// goes, `wi` to where it comes from.
@@ -38,8 +43,19 @@ pub trait Bsdf: Send + Sync + std::fmt::Debug {
         false
     }
 
-    /// Share of even light that comes back from outside, in [0, 1]; black of what reflects nothing.
+    /// Share of even light that comes back from outside, in [0, 1]; black of what reflects nothing. Where it differs from point to
+    /// point, its mean.
     fn albedo(&self) -> Rgb;
+
+    /// The same at one point.
+    fn albedo_at(&self, _: &SurfacePoint) -> Rgb {
+        self.albedo()
+    }
+
+    /// The picture on it, for which points need texture coordinates.
+    fn texture(&self) -> Option<&Arc<Texture>> {
+        None
+    }
 
     /// What `check` says of it.
     fn text(&self) -> String;

@@ -1,0 +1,128 @@
+//! Pictures on surfaces: as typed, and as rendered.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::tree::{Fields, Node};
+use super::values::{colour, rgb};
+use crate::error::{Error, Result};
+use crate::film::{FilePicture, Image};
+use crate::math::Rgb;
+use crate::surface::{Texture, Wrap};
+use crate::words::either;
+
+/// `{ image = ... }` in the place of a colour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TextureEntry {
+    /// A PNG, JPEG, EXR or Radiance HDR file, looked for beside the scene file.
+    pub image: PathBuf,
+    /// The layer of an EXR file that has several.
+    pub layer: Option<String>,
+    /// What its values are multiplied by, not negative.
+    pub scale: Rgb,
+    /// What is beyond its edges.
+    pub wrap: Wrap,
+    /// File and line, for messages.
+    pub at: String,
+}
+
+const FILES: &str = "the name of a PNG, JPEG, EXR or HDR file";
+
+/// The picture under `key`, if it is a table.
+pub(super) fn read(m: &Fields<'_>, key: &str) -> Result<Option<TextureEntry>> {
+    if !m.is_table(key) {
+        return Ok(None);
+    }
+    let Some(t) = m.table(key)? else { return Ok(None) };
+    t.only("a picture on a surface", &["image", "layer", "scale", "wrap"])?;
+    let scale = t.get("scale", "one number or three, none negative", |n| colour(n, |v| v >= 0.0))?;
+    let wrap = |n: &Node| match n.text()? {
+        "repeat" => Some(Wrap::Repeat),
+        "clamp" => Some(Wrap::Clamp),
+        _ => None,
+    };
+    Ok(Some(TextureEntry {
+        image: t.need("image", FILES, |n| n.text().filter(|t| !t.is_empty()))?.into(),
+        layer: t.get("layer", "the name of a layer", Node::text)?.map(String::from),
+        scale: scale.map_or(Rgb::WHITE, rgb),
+        wrap: t.get("wrap", "\"repeat\" or \"clamp\"", wrap)?.unwrap_or_default(),
+        at: m.at_key(key),
+    }))
+}
+
+/// Refuses pictures under all keys but `but`.
+pub(super) fn refuse_elsewhere(m: &Fields<'_>, but: Option<&str>) -> Result<()> {
+    match m.keys().find(|key| m.is_table(key) && Some(*key) != but) {
+        Some(key) => {
+            Err(m.error_at(key, "is a table: pictures are for `albedo` of type = \"diffuse\" alone; give numbers"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Reads the pictures that are `typed`, those alike once.
+pub(super) fn load<'a>(
+    typed: impl Iterator<Item = Option<&'a TextureEntry>>,
+    folder: &Path,
+    said: &mut Vec<String>,
+) -> Result<Vec<Option<Arc<Texture>>>> {
+    let mut known: Vec<(TextureEntry, Arc<Texture>)> = Vec::new();
+    let one = |typed: Option<&TextureEntry>| {
+        let Some(typed) = typed else { return Ok(None) };
+        let alike = TextureEntry { at: String::new(), ..typed.clone() };
+        if let Some((_, texture)) = known.iter().find(|(other, _)| *other == alike) {
+            return Ok(Some(texture.clone()));
+        }
+        let texture = Arc::new(typed.load(folder, said)?);
+        known.push((alike, texture.clone()));
+        Ok(Some(texture))
+    };
+    typed.map(one).collect()
+}
+
+impl TextureEntry {
+    /// Reads the picture, which is looked for in `folder`; what is odd about it goes to `said`.
+    fn load(&self, folder: &Path, said: &mut Vec<String>) -> Result<Texture> {
+        let path = folder.join(&self.image);
+        let read = FilePicture::read_texture(&path, self.layer.as_deref()).map_err(|e| e.within(&self.at))?;
+        said.extend(read.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
+        let mut image = read.image;
+        let [width, height] = image.resolution;
+        if image.window.area() as u64 != u64::from(width) * u64::from(height) {
+            let why = "its data window leaves out part of the picture; save all of it";
+            return Err(Error::file(&path, "use", why).within(&self.at));
+        }
+        self.scale_within(&path, &mut image, said);
+        Ok(Texture::new(self.image.display().to_string(), width, image.pixels, self.wrap))
+    }
+
+    /// Multiplied by the factor, and no less than 0 and no more than 1; it is said how much is not.
+    fn scale_within(&self, path: &Path, image: &mut Image, said: &mut Vec<String>) {
+        let (mut negative, mut above, mut nan, mut largest) = (0_u64, 0_u64, 0_u64, 1.0_f32);
+        for pixel in &mut image.pixels {
+            *pixel = self.scale * *pixel;
+            for value in &mut pixel.0 {
+                match *value {
+                    v if v.is_nan() => (nan, *value) = (nan + 1, 0.0),
+                    v if v < 0.0 => (negative, *value) = (negative + 1, 0.0),
+                    v if v > 1.0 => (above, largest, *value) = (above + 1, largest.max(v), 1.0),
+                    _ => {}
+                }
+            }
+        }
+        let all = image.pixels.len() as u64 * 3;
+        let odd = negative + above + nan;
+        if odd > 0 {
+            let most = if above > 0 { format!(", the largest {largest}") } else { String::new() };
+            said.push(format!(
+                "{}: {}: {odd} of {all} values {} no albedo and {} taken as the nearest one ({negative} below 0, {above} above 1{most}, \
+                 {nan} not a number); mend the picture{}",
+                self.at,
+                path.display(),
+                either(odd as usize, "is", "are"),
+                either(odd as usize, "is", "are"),
+                if above > 0 { ", or use a smaller `scale`" } else { "" }
+            ));
+        }
+    }
+}
