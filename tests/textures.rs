@@ -275,6 +275,31 @@ fn values_that_are_no_albedo_are_counted() {
     assert!(!scene.warnings.join("\n").contains("3 above 1"), "{:?}", scene.warnings);
 }
 
+/// Meshes have coordinates only where their material has a picture, and pictures alike are one.
+#[test]
+fn nothing_is_kept_that_nobody_needs() {
+    let folder = tempfile::tempdir().unwrap();
+    save_exr(&checker(), folder.path(), "a.exr");
+    std::fs::write(folder.path().join("cube.obj"), cube(true)).unwrap();
+    let object = |geometry: &str, material: &str| format!("[[object]]\n{geometry}\nmaterial = \"{material}\"\n");
+    let (mesh, ball) = ("mesh = \"cube.obj\"", "shape = \"sphere\"\ncentre = [9, 0, 0]\nradius = 1");
+    let wall = "shape = \"rectangle\"\ncentre = [0, 9, 0]\nedge_u = [1, 0, 0]\nedge_v = [0, 0, 1]";
+    let all = [(mesh, "one"), (mesh, "grey"), (ball, "two"), (ball, "grey"), (wall, "other"), (wall, "grey")];
+    let objects: String = all.map(|(geometry, material)| object(geometry, material)).concat();
+    let text = format!(
+        "{EYE}{objects}{SUN}[material.grey]\ntype = \"diffuse\"\nalbedo = 0.5\n\
+         [material.one]\ntype = \"diffuse\"\nalbedo = {{ image = \"a.exr\" }}\n\
+         [material.two]\ntype = \"diffuse\"\nalbedo = {{ image = \"a.exr\" }}\n\
+         [material.other]\ntype = \"diffuse\"\nalbedo = {{ image = \"a.exr\", wrap = \"clamp\" }}\n"
+    );
+    let scene = load_in(folder.path(), &text);
+    let has: Vec<bool> = scene.objects.iter().map(|o| o.mesh.uv.is_some()).collect();
+    assert_eq!(has, [true, false, true, false, true, false]);
+    let texture = |object: u32| scene.surface(object).bsdf.texture().unwrap();
+    assert!(std::ptr::eq(&**texture(0), &**texture(2)) && !std::ptr::eq(&**texture(0), &**texture(4)));
+    assert_eq!(texture(0).resolution(), [32, 32]);
+}
+
 /// A cube of six faces with corners of their own in the picture: each position has three of them.
 fn cube(with_uv: bool) -> String {
     let mut text = String::new();
