@@ -94,7 +94,7 @@ const MALFORMED: &[(&str, &str, u32, &[&str])] = &[
     ("name = \"lamp\"", "name = \"ball\"", 14, &["\"ball\" is taken (x.toml:7)"]),
     ("edge_u = [1, 0, 0]", "", 13, &["`object.1.edge_u` is missing"]),
     ("type = \"translucent\"", "", 20, &["`material.stone.type` is missing"]),
-    ("type = \"translucent\"", "type = \"mirror\"", 21, &["not built yet", "translucent"]),
+    ("type = \"translucent\"", "type = \"mirror\"", 21, &["conductor", "reflectance"]),
     ("type = \"translucent\"", "type = \"difuse\"", 21, &["did you mean `diffuse`?"]),
     ("sigma_s_prime = [2, 3, 4]", "sigma_s_prime = [2, -3, 4]", 22, &["[2, -3, 4]", "none negative"]),
     ("sigma_s_prime = [2, 3, 4]", "sigma_s_prime = [2, nan, 4]", 22, &["NaN"]),

@@ -6,10 +6,12 @@
 //! four times as many triangles. Read first: `lotus.rs`, the hero; `polygonise.rs` turns it into triangles.
 #![allow(clippy::print_stderr)] // a program of its own, outside the library
 
+mod candles;
 mod cornell;
 mod improve;
 mod lotus;
 mod mesh;
+mod openwork;
 mod polygonise;
 mod shapes;
 #[cfg(test)]
@@ -50,6 +52,11 @@ fn parts(cell: f64) -> Vec<Part> {
         open("box/star.obj", "a lamp: a star facing down", cornell::star()),
         open("box/ring.obj", "a lamp: a ring facing +z", cornell::ring()),
         solid("tholos/tholos.obj", "a round temple", tholos::tholos()),
+        solid("candles/tall.obj", "a tall candle", candles::candle(0)),
+        solid("candles/middle.obj", "a candle of middle height", candles::candle(1)),
+        solid("candles/low.obj", "a low candle", candles::candle(2)),
+        solid("jade/ball.obj", "an openwork ball", polygonise::polygonise(&openwork::Openwork, 2.0 * cell)),
+        solid("jade/stand.obj", "a ring to stand a ball on", openwork::stand()),
     ]
 }
 

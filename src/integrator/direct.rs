@@ -1,5 +1,6 @@
 //! Direct light on opaque surfaces: soft shadows of area lights.
 
+use super::glossy::Glossy;
 use super::shade::DirectLight;
 use super::{CameraRay, Integrator, KnownLights, Part, View, camera_hits};
 use crate::error::Result;
@@ -10,11 +11,12 @@ use crate::scene::{Scene, Surface};
 use crate::surface::Lambertian;
 use crate::tally::Tally;
 
-/// Lambertian surfaces under the scene's lights, without interreflection. A translucent surface is shown as
+/// Opaque surfaces under the scene's lights, without interreflection. A translucent surface is shown as
 /// a Lambertian one with its model's diffuse reflectance: a preview.
 pub struct Direct {
     light: DirectLight,
     albedo: Albedos,
+    glossy: Option<Glossy>,
 }
 
 impl Direct {
@@ -24,7 +26,7 @@ impl Direct {
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, light_samples: u32) -> Result<Self> {
         let light = DirectLight { lights: Lights::new(scene), samples: light_samples };
-        Ok(Self { light, albedo: Albedos::new(scene)? })
+        Ok(Self { light, albedo: Albedos::new(scene)?, glossy: Glossy::new(scene) })
     }
 }
 
@@ -64,15 +66,17 @@ impl Integrator for Direct {
     fn radiance(&self, view: View<'_>, (): &(), rays: &[CameraRay], out: &mut [Rgb], tally: &mut Tally) {
         let hits = camera_hits(view, rays, tally);
         for ((ray, hit), out) in rays.iter().zip(&hits).zip(out) {
-            *out = match hit {
-                None => self.light.lights.environment(ray.ray.direction),
-                Some(hit) => {
-                    let at = view.point(hit, ray.ray.direction);
-                    let mut stream = ray.stream;
-                    emitted(view.scene, hit, ray.ray.direction)
-                        + self.light.reflected(view, &at, self.albedo.at(view.scene, hit.mesh, &at), &mut stream, tally)
-                }
+            let Some(hit) = hit else {
+                *out = self.light.lights.environment(ray.ray.direction);
+                continue;
             };
+            let glossy = self.glossy.as_ref().and_then(|glossy| glossy.radiance(view, ray, hit, tally));
+            *out = glossy.unwrap_or_else(|| {
+                let at = view.point(hit, ray.ray.direction);
+                let mut stream = ray.stream;
+                emitted(view.scene, hit, ray.ray.direction)
+                    + self.light.reflected(view, &at, self.albedo.at(view.scene, hit.mesh, &at), &mut stream, tally)
+            });
         }
     }
 

@@ -5,6 +5,7 @@ mod ambient_occlusion;
 mod direct;
 mod first_order;
 mod followed;
+mod glossy;
 mod indirect;
 mod local;
 mod lost;

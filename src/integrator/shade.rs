@@ -83,7 +83,9 @@ impl DirectLight {
         let far = (!far.is_empty())
             .then(|| Part::built("lights far away", format!("{}, asked for by direction", far.join(", "))));
         let no_size: Vec<String> = self.lights.of_no_size(scene).collect();
-        let mirrored = (!no_size.is_empty() && scene.bodies.iter().any(Option::is_some)).then(|| {
+        let mirrored = (!no_size.is_empty()
+            && scene.materials.iter().any(|m| !m.surface.is_lambertian() && !m.surface.shines()))
+        .then(|| {
             let name = format!("mirror images of {}", no_size.join(", "));
             Part::left_out(
                 name,

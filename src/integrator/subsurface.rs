@@ -1,6 +1,7 @@
 //! Translucent surfaces: light gathered from a cache of transmitted-light samples, leaving through the boundary.
 
 use super::direct::Albedos;
+use super::glossy::Glossy;
 use super::indirect::{Indirect, OVER};
 use super::parts::{clear_bodies, of_cache};
 use super::shade::DirectLight;
@@ -34,6 +35,8 @@ pub struct Subsurface {
     options: SubsurfaceOptions,
     light: DirectLight,
     albedo: Albedos,
+    /// Opaque surfaces that are not Lambertian, where no paths go on.
+    glossy: Option<Glossy>,
     /// One for each object; `None` where it is not translucent or has no area.
     plans: Vec<Option<Arc<Plan>>>,
     /// One for each object: whether paths walk through it.
@@ -74,6 +77,7 @@ impl Subsurface {
             options,
             light: DirectLight { lights, samples: options.light_samples },
             albedo: Albedos::new(scene)?,
+            glossy: if indirect.is_none() { Glossy::new(scene) } else { None },
             plans,
             walked,
             single: if options.single && indirect.is_none() { Single::new(scene, options.seed)? } else { None },
@@ -160,7 +164,7 @@ impl Subsurface {
             out[i] = match hit {
                 _ if inside => indirect.paths.seen_from_inside(view, ray, &mut paths, tally),
                 None => self.light.lights.environment(ray.ray.direction),
-                Some(hit) if view.scene.surface(hit.mesh).is_opaque() => {
+                Some(hit) if view.scene.surface(hit.mesh).is_lambertian() => {
                     let at = view.point(hit, ray.ray.direction);
                     let albedo = self.albedo.at(view.scene, hit.mesh, &at);
                     let straight = self.light.reflected(view, &at, albedo, &mut ray.stream.clone(), tally);
@@ -196,6 +200,9 @@ impl Subsurface {
     }
 
     fn shade(&self, view: View<'_>, ray: &CameraRay, hit: &Hit, inside: Rgb, tally: &mut Tally) -> Rgb {
+        if let Some(glossy) = self.glossy.as_ref().and_then(|glossy| glossy.radiance(view, ray, hit, tally)) {
+            return glossy;
+        }
         let at = view.point(hit, ray.ray.direction);
         let mut stream = ray.stream;
         let object = hit.mesh as usize;

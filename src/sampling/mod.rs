@@ -14,4 +14,4 @@ pub use filter::PixelFilter;
 pub use pairs::Pairs;
 pub use stream::PixelStream;
 pub use turn::Turn;
-pub use warp::{cosine_hemisphere, disk};
+pub use warp::{cosine_hemisphere, disk, hemisphere};

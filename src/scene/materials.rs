@@ -2,7 +2,7 @@
 
 use super::tree::{Fields, Node};
 use super::values::{self, RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
-use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, textures};
+use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, opaque, textures};
 use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
@@ -23,7 +23,7 @@ pub struct MaterialEntry {
     pub(super) without_thickness: Option<String>,
 }
 
-const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "emissive"];
+const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "plastic", "conductor", "emissive"];
 const COEFFICIENT: &str = "one number or three in 1/unit, none negative";
 const G: &str = "a number above -1 and below 1";
 const ETA: &str = "n_inside / n_outside, a number above 0";
@@ -33,19 +33,21 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
     let Some(table) = top.table("material")? else { return Ok(Vec::new()) };
     let entries = table.tables().map(|entry| {
         let (name, m) = entry?;
-        let kind = m.need("type", "\"translucent\", \"dielectric\", \"diffuse\" or \"emissive\"", Node::text)?;
+        let kind = m.need(
+            "type",
+            "\"translucent\", \"dielectric\", \"diffuse\", \"plastic\", \"conductor\" or \"emissive\"",
+            Node::text,
+        )?;
         let (mut without_thickness, mut albedo_image) = (None, None);
         textures::refuse_elsewhere(&m, (kind == "diffuse").then_some("albedo"))?;
         let surface = match kind {
             "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), &mut without_thickness)?,
             "diffuse" => {
-                m.only("a diffuse material", &["type", "albedo"])?;
                 albedo_image = textures::read(&m, "albedo")?;
-                let expected = "one number or three from 0 to 1, or { image = \"FILE\" }";
-                let share = |n: &Node| colour(n, |v| (0.0..=1.0).contains(&v));
-                let albedo = if albedo_image.is_some() { [1.0; 3] } else { m.need("albedo", expected, share)? };
-                Surface::diffuse(rgb(albedo))
+                opaque::diffuse(&m, albedo_image.is_some())?
             }
+            "conductor" => opaque::conductor(&m)?,
+            "plastic" => opaque::plastic(&m)?,
             "emissive" => {
                 m.only("an emissive material", &["type", "radiance", "two_sided"])?;
                 let radiance = m.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0))?;
@@ -54,7 +56,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             "dielectric" => dielectric(&m, unit_in_mm.unwrap_or(1.0))?,
             "mirror" => {
-                let what = format!("{kind:?} is not built yet; there are {}", KINDS.join(", "));
+                let what = "a mirror is type = \"conductor\" with `reflectance = 1`, or with a `metal`";
                 return Err(m.error_at("type", what));
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),

@@ -20,6 +20,7 @@ mod materials;
 mod objects;
 mod obstacle;
 mod obstacles;
+mod opaque;
 mod options;
 mod precision;
 mod seams;

@@ -106,6 +106,11 @@ impl Surface {
         Self { bsdf: Arc::new(Lambertian { albedo }), emission: None, inside: None, clear: None }
     }
 
+    /// An opaque surface of any kind.
+    pub fn opaque(bsdf: Arc<dyn Bsdf>) -> Self {
+        Self { bsdf, emission: None, inside: None, clear: None }
+    }
+
     /// Lambertian, both sides alike, with a picture for albedo: of objects with texture coordinates.
     pub fn textured(albedo: Arc<Texture>) -> Self {
         Self { bsdf: Arc::new(Textured { albedo }), emission: None, inside: None, clear: None }
@@ -146,6 +151,11 @@ impl Surface {
     /// Whether it is neither a lamp nor the boundary of a body.
     pub fn is_opaque(&self) -> bool {
         self.emission.is_none() && !self.is_body()
+    }
+
+    /// Whether it is opaque, and reflects alike into all directions.
+    pub fn is_lambertian(&self) -> bool {
+        self.is_opaque() && self.bsdf.is_lambertian()
     }
 
     /// Whether it sends out any light.

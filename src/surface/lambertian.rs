@@ -32,6 +32,10 @@ impl Bsdf for Lambertian {
         at.n.dot(wi).max(0.0) * FRAC_1_PI
     }
 
+    fn is_lambertian(&self) -> bool {
+        true
+    }
+
     fn albedo(&self) -> Rgb {
         self.albedo
     }

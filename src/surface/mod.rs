@@ -2,14 +2,21 @@
 //! inside a body (`integrator/volume_path`). Read first: [`Bsdf`]; each kind is one file.
 
 mod boundary;
+mod conductor;
 mod lambertian;
+mod microfacets;
+mod oren_nayar;
+mod plastic;
 mod texture;
 mod textured;
 
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 pub use boundary::Boundary;
+pub use conductor::{Conductor, METALS, Reflectance};
 pub use lambertian::Lambertian;
+pub use oren_nayar::OrenNayar;
+pub use plastic::Plastic;
 use std::sync::Arc;
 pub use texture::{Texture, Wrap};
 pub use textured::Textured;
@@ -20,7 +27,7 @@ pub trait Bsdf: Send + Sync + std::fmt::Debug {
     /// f [1/sr], without the cosine at `wi`; black for light of a delta function.
     fn eval(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> Rgb;
 
-    /// A direction of light that goes on to `wo`, from numbers in [0, 1); `None` where there is none.
+    /// A direction of light that goes on to `wo`, from numbers in [0, 1); `None` where there is none. It may lie below the shading or the true surface.
     fn sample(&self, at: &SurfacePoint, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample>;
 
     /// Density of `wi` [1/sr] by [`Self::sample`]; 0 for delta functions.
@@ -28,6 +35,11 @@ pub trait Bsdf: Send + Sync + std::fmt::Debug {
 
     /// Whether all of it is delta functions, so that lights cannot be asked for.
     fn is_delta(&self) -> bool {
+        false
+    }
+
+    /// Whether it reflects alike into all directions, whatever direction light comes from: by its albedo over π.
+    fn is_lambertian(&self) -> bool {
         false
     }
 
@@ -54,7 +66,7 @@ pub trait Bsdf: Send + Sync + std::fmt::Debug {
 pub struct BsdfSample {
     /// Unit direction of the light, away from the surface.
     pub wi: Vec3,
-    /// f cosθ / pdf, each channel in [0, 1].
+    /// f cosθ / pdf, each channel in [0, 1] but for rough surfaces, where it may be some times 1; of a part that is a delta function its share over its chance.
     pub weight: Rgb,
     /// Density [1/sr]; 0 of a delta function.
     pub pdf: f32,

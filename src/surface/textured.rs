@@ -31,6 +31,10 @@ impl Bsdf for Textured {
         Lambertian::BLACK.pdf(at, wo, wi)
     }
 
+    fn is_lambertian(&self) -> bool {
+        true
+    }
+
     /// The mean of the picture.
     fn albedo(&self) -> Rgb {
         self.albedo.mean()

@@ -16,9 +16,11 @@ use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::scene::{Orders, Surface};
-use crate::surface::{Bsdf, Lambertian};
+use crate::surface::Bsdf;
 use crate::tally::{Cause, Tally, WalkTally};
-use std::f32::consts::FRAC_1_PI;
+
+/// A path that a surface with a mirror has left this weight goes on for certain.
+const GOES_ON: f32 = 0.25;
 
 /// A path and what it has found.
 pub struct CameraPath<'a> {
@@ -223,13 +225,17 @@ impl<'a> CameraPath<'a> {
         let (before, mut after) = (self.spectrum.value_outside().max(), self.spectrum);
         after.scale(bsdf.albedo());
         let left = after.value_outside().max();
-        if left <= 0.0 || !russian_roulette(left / before, &mut self.spectrum, &mut self.draws) {
+        // Mirror images of few samples are not for chance to thin out.
+        let chance = if bsdf.is_lambertian() { left / before } else { left / GOES_ON };
+        if left <= 0.0 || !russian_roulette(chance, &mut self.spectrum, &mut self.draws) {
             return None;
         }
         let [u, v] = self.draws.pair();
-        let next = bsdf.sample(at, wo, [u, v, 0.0])?;
+        let which = if bsdf.is_lambertian() { 0.0 } else { self.draws.number() };
+        let next = bsdf.sample(at, wo, [u, v, which])?;
         self.spectrum.scale(next.weight);
-        self.turn((!bsdf.is_delta()).then(|| (next.pdf, Reference::surface(at))));
+        // Of a mirror, or of the mirror in a coat, nothing was asked.
+        self.turn((next.pdf > 0.0).then(|| (next.pdf, Reference::surface(at))));
         (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
@@ -355,11 +361,10 @@ impl WalkObserver for Gather<'_, '_> {
         path.add(light * (path.other / (body.eta * body.eta)));
     }
 
-    fn surface(&mut self, at: &SurfacePoint, albedo: Rgb, spectrum: &Spectrum) {
+    fn surface(&mut self, at: &SurfacePoint, wo: Vec3, bsdf: &dyn Bsdf, spectrum: &Spectrum) {
         let (path, body) = (&mut *self.path, self.body);
         if body.matched {
-            let (bsdf, weight) = (Lambertian { albedo }, spectrum.value(&body.medium));
-            path.ask_on((at, at.n_geometric, &bsdf), self.around, weight, |path| &mut path.coins);
+            path.ask_on((at, wo, bsdf), self.around, spectrum.value(&body.medium), |path| &mut path.coins);
         }
     }
 
@@ -368,10 +373,8 @@ impl WalkObserver for Gather<'_, '_> {
         match turn {
             Turn::None(length) => path.flown += length,
             Turn::Scattered(x, pdf) => path.turn(asks.then(|| (pdf, Reference::place(x)))),
-            Turn::Reflected(at, w) => {
-                let pdf = at.n_geometric.dot(w) * FRAC_1_PI;
-                path.turn(asks.then(|| (pdf, Reference::surface(&SurfacePoint { n: at.n_geometric, ..*at }))));
-            }
+            // Of a mirror nothing was asked.
+            Turn::Reflected(at, pdf) => path.turn((asks && pdf > 0.0).then(|| (pdf, Reference::surface(at)))),
             Turn::Bent => path.turn(None),
         }
     }

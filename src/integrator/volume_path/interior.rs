@@ -9,7 +9,6 @@ use crate::integrator::View;
 use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium};
 use crate::query::{Hit, Ray};
-use crate::sampling::cosine_hemisphere;
 use crate::scene::{Contacts, Surface};
 use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
@@ -88,8 +87,8 @@ pub trait WalkObserver {
     /// A lamp inside the body ends the path, which came to it along `w`.
     fn lamp(&mut self, _hit: &Hit, _w: Vec3, _spectrum: &Spectrum) {}
 
-    /// The path has come to an opaque surface inside the body of this albedo, which faces it.
-    fn surface(&mut self, _at: &SurfacePoint, _albedo: Rgb, _spectrum: &Spectrum) {}
+    /// The path has come to an opaque surface inside the body, which faces it, and goes back along `_wo`.
+    fn surface(&mut self, _at: &SurfacePoint, _wo: Vec3, _bsdf: &dyn Bsdf, _spectrum: &Spectrum) {}
 
     /// How the path goes on.
     fn turned(&mut self, _turn: Turn<'_>) {}
@@ -102,8 +101,8 @@ pub enum Turn<'a> {
     None(f32),
     /// Scattered at this place, into a direction of this density [1/sr].
     Scattered(DVec3, f32),
-    /// Reflected by a Lambertian surface, which faces it, into this direction.
-    Reflected(&'a SurfacePoint, Vec3),
+    /// Reflected by an opaque surface, which faces it, into a direction of this density [1/sr]; 0 by a mirror.
+    Reflected(&'a SurfacePoint, f32),
     /// Refracted or mirrored.
     Bent,
 }
@@ -151,8 +150,8 @@ pub enum Flight {
     Collision(DVec3),
     /// The body's own boundary from inside, normals outwards.
     Boundary(SurfacePoint, f32),
-    /// An opaque surface inside, with its albedo.
-    Opaque(SurfacePoint, f32, Rgb),
+    /// An opaque surface inside, of this object.
+    Opaque(SurfacePoint, f32, u32),
     /// A lamp inside.
     Lamp(Hit),
     /// Where no light can be.
@@ -291,7 +290,7 @@ impl Interior {
         match view.scene.surface(hit.mesh) {
             Surface { emission: Some(_), .. } => Flight::Lamp(hit),
             surface if surface.is_body() => Flight::Lost(Cause::OtherMedium),
-            Surface { bsdf, .. } => Flight::Opaque(at.facing(-w), hit.t, bsdf.albedo()),
+            _ => Flight::Opaque(at.facing(-w), hit.t, hit.mesh),
         }
     }
 
@@ -358,17 +357,10 @@ impl Interior {
                     w = next;
                     (from, edge, bounces, free) = (at.leave(w), None, bounces + 1, 0.0);
                 }
-                Flight::Opaque(at, t, albedo) => {
+                Flight::Opaque(at, t, object) => {
                     spectrum.fly(t);
-                    watch.surface(&at, albedo, spectrum);
-                    let before = spectrum.value(&self.medium).max();
-                    spectrum.scale(albedo);
-                    let left = spectrum.value(&self.medium).max();
-                    if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
-                        return None;
-                    }
-                    w = cosine_hemisphere(at.n_geometric, draws.pair());
-                    watch.turned(Turn::Reflected(&at, w));
+                    let bsdf = &*view.scene.surface(object).bsdf;
+                    w = reflected((&at, w), bsdf, (&self.medium, spectrum), draws, watch)?;
                     (from, edge, bounces, free) = (at.leave(w), None, bounces + 1, 0.0);
                 }
                 Flight::Lamp(hit) => {
@@ -387,6 +379,31 @@ impl Interior {
             }
         }
     }
+}
+
+/// How a path in a medium goes on that came along `w` to an opaque surface, which faces it; `None` where it ends.
+pub fn reflected(
+    (at, w): (&SurfacePoint, Vec3),
+    bsdf: &dyn Bsdf,
+    (medium, spectrum): (&Coefficients, &mut Spectrum),
+    draws: &mut PathSampler,
+    watch: &mut impl WalkObserver,
+) -> Option<Vec3> {
+    let at = SurfacePoint { n: at.n_geometric, ..*at };
+    watch.surface(&at, -w, bsdf, spectrum);
+    let (before, albedo) = (spectrum.value(medium).max(), bsdf.albedo());
+    spectrum.scale(albedo);
+    let left = spectrum.value(medium).max();
+    if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
+        return None;
+    }
+    let [u, v] = draws.pair();
+    let which = if bsdf.is_lambertian() { 0.0 } else { draws.number() };
+    let next = bsdf.sample(&at, -w, [u, v, which])?;
+    // The albedo is in already.
+    spectrum.scale(Rgb::from_fn(|c| if albedo[c] > 0.0 { next.weight[c] / albedo[c] } else { 0.0 }));
+    watch.turned(Turn::Reflected(&at, next.pdf));
+    (at.n_geometric.dot(next.wi) > 0.0).then_some(next.wi)
 }
 
 /// Roulette: true with probability `chance`, and then the path is worth 1/`chance` more.

@@ -10,16 +10,15 @@
 
 use super::draws::PathSampler;
 use super::interior::{
-    Edge, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, Turn, WalkExit, WalkObserver, russian_roulette,
+    Edge, Interior, MOST_SURFACES, ROULETTE_BELOW, Straight, Turn, WalkExit, WalkObserver, reflected, russian_roulette,
 };
 use super::spectrum::Spectrum;
 use crate::geometry::SurfacePoint;
 use crate::integrator::View;
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::math::{DVec3, Vec3};
 use crate::query::{Hit, Ray};
-use crate::sampling::cosine_hemisphere;
 use crate::scene::Nests;
-use crate::surface::{Boundary, Bsdf};
+use crate::surface::{Boundary, Bsdf, Lambertian};
 use crate::tally::{Cause, WalkTally};
 
 /// The bodies around a place, from the weakest to the strongest, each with the number of times.
@@ -178,8 +177,8 @@ pub trait Guide {
 pub enum Meets {
     /// They enter it.
     Enters,
-    /// As an opaque surface of this albedo.
-    Matt(Rgb),
+    /// As an opaque surface: what stands for a body, or else the surface itself.
+    Opaque(Option<Lambertian>),
     /// They end, and are counted.
     Ends,
 }
@@ -279,21 +278,16 @@ pub fn walk<'a>(
             continue;
         }
         let surface = view.scene.surface(hit.mesh);
-        let met = match if surface.is_body() { guide.meets(hit.mesh) } else { Meets::Matt(surface.bsdf.albedo()) } {
-            Meets::Matt(_) if surface.emission.is_some() => {
+        let met = match if surface.is_body() { guide.meets(hit.mesh) } else { Meets::Opaque(None) } {
+            Meets::Opaque(_) if surface.emission.is_some() => {
                 guide.watch(body, &stack, false).lamp(&hit, w, spectrum);
                 return None;
             }
-            Meets::Matt(albedo) => {
-                let (at, before) = (at.facing(-w), spectrum.value(&body.medium).max());
-                guide.watch(body, &stack, false).surface(&at, albedo, spectrum);
-                spectrum.scale(albedo);
-                let left = spectrum.value(&body.medium).max();
-                if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
-                    return None;
-                }
-                w = cosine_hemisphere(at.n_geometric, draws.pair());
-                guide.watch(body, &stack, false).turned(Turn::Reflected(&at, w));
+            Meets::Opaque(stand_in) => {
+                let at = at.facing(-w);
+                let bsdf: &dyn Bsdf = stand_in.as_ref().map_or(&*surface.bsdf, |matt| matt);
+                let watch = &mut guide.watch(body, &stack, false);
+                w = reflected((&at, w), bsdf, (&body.medium, spectrum), draws, watch)?;
                 (from, phase) = (at.leave(w), None);
                 continue;
             }
