@@ -140,6 +140,23 @@ fn paths_go_on_by_the_picture() {
     render(&|| film(&subsurface(&scene, 8), &scene, 256, 1, &mut []).image(), "subsurface");
 }
 
+/// Roulette is by the albedo there: under an even sky a white spot of a black picture is without noise.
+#[test]
+fn a_spot_of_a_dark_picture_is_without_noise() {
+    let folder = tempfile::tempdir().unwrap();
+    let spot = |x: u32, y: u32| Rgb::splat(if (12..20).contains(&x) && (12..20).contains(&y) { 1.0 } else { 0.0 });
+    save_exr(&Image::from_fn([32, 32], spot), folder.path(), "spot.exr");
+    let text = wall("{ image = \"spot.exr\" }").replace(SUN, "[environment]\nradiance = 1\n");
+    let scene = load_in(folder.path(), &text.replace("height = 8", "height = 1"));
+    for image in [
+        film(&Paths::new(&scene, None, 1).unwrap(), &scene, 2, 1, &mut []).image(),
+        film(&volume_path(&scene), &scene, 2, 1, &mut []).image(),
+    ] {
+        let (least, most) = image.pixels.iter().fold((f32::MAX, 0.0_f32), |(a, b), p| (a.min(p[0]), b.max(p[0])));
+        assert!(least > 0.98 && most < 1.02, "{least} {most}");
+    }
+}
+
 /// A floor along the sun, which sees nothing but a wall, black to the left and white to the right.
 #[test]
 fn light_between_surfaces_has_the_picture_at_its_points() {
