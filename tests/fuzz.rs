@@ -9,8 +9,10 @@
 #![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 
 use marmor::bssrdf::{ModelName, ModelOptions, WidthFit};
-use marmor::film::{Checkpoint, Film, Identity, Image, Metadata, PngOptions, Window, read_attributes, save};
-use marmor::geometry::{examine, load_obj, mended};
+use marmor::film::{
+    Checkpoint, FilePicture, Film, Identity, Image, Metadata, PngOptions, Window, read_attributes, save,
+};
+use marmor::geometry::{examine, load_obj_with_uv, mended};
 use marmor::integrator::{Direct, Subsurface, SubsurfaceOptions};
 use marmor::math::{DVec3, Rgb, hash};
 use marmor::report::{Batch, BatchOptions};
@@ -272,7 +274,8 @@ fn obj() {
     fuzz("obj", &lines(&[cube, colours, plate, soup]), |bytes, folder| {
         let path = folder.join("m.obj");
         std::fs::write(&path, bytes).unwrap();
-        let Ok(mesh) = load_obj(&path) else { return false };
+        let Ok(mesh) = load_obj_with_uv(&path) else { return false };
+        let _ = mesh.without_uv();
         examine(&mesh.recentred(DVec3::ZERO));
         let (mesh, _) = mended(mesh);
         examine(&mesh.with_smooth_normals().recentred(DVec3::ONE));
@@ -310,6 +313,78 @@ fn hdr() {
         let path = folder.join("a.hdr");
         std::fs::write(&path, bytes).unwrap();
         Image::read_exr(&path).is_ok()
+    });
+}
+
+/// A JPEG of 8 x 8 pixels of each component, all of one value: tables of one code each.
+fn jpeg(frame: u8, components: &[u8], data: &[u8]) -> Vec<u8> {
+    let codes = |class: u8| [&[0xff, 0xc4, 0, 20, class, 1][..], &[0; 16]].concat();
+    let n = components.len() as u8;
+    let of_frame = components.iter().zip(1..).flat_map(|(&sampling, id)| [id, sampling, 0]);
+    let of_scan = (1..=n).flat_map(|id| [id, 0]);
+    let last = if frame == 0xc2 { 0 } else { 63 };
+    let parts = [
+        vec![0xff, 0xd8, 0xff, 0xdb, 0, 67, 0],
+        vec![1; 64],
+        [0xff, frame, 0, 8 + 3 * n, 8, 0, 8, 0, 8, n].into_iter().chain(of_frame).collect(),
+        codes(0x00),
+        codes(0x10),
+        [0xff, 0xda, 0, 6 + 2 * n, n].into_iter().chain(of_scan).chain([0, last, 0]).collect(),
+        data.to_vec(),
+        vec![0xff, 0xd9],
+    ];
+    parts.concat()
+}
+
+/// A PNG with checksums of its own, so that changes reach what is behind them.
+fn with_checksums(mut bytes: Vec<u8>) -> Vec<u8> {
+    let mut at = 8;
+    while let Some(length) = bytes.get(at..at + 4) {
+        let length = u32::from_be_bytes([length[0], length[1], length[2], length[3]]) as usize;
+        let end = at + 8 + length;
+        let Some(chunk) = bytes.get(at + 4..end) else { break };
+        let bit = |crc: u32| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+        let byte = |crc: u32, &byte: &u8| (0..8).fold(crc ^ u32::from(byte), |crc, _| bit(crc));
+        let crc = !chunk.iter().fold(u32::MAX, byte);
+        let Some(old) = bytes.get_mut(end..end + 4) else { break };
+        old.copy_from_slice(&crc.to_be_bytes());
+        at = end + 4;
+    }
+    bytes
+}
+
+#[test]
+fn picture() {
+    let png = |colour: png::ColorType, depth: png::BitDepth, codes: &[u8]| {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 4, 4);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        if colour == png::ColorType::Indexed {
+            encoder.set_palette(vec![0, 0, 0, 255, 128, 0, 1, 2, 3]);
+        }
+        encoder.write_header().unwrap().write_image_data(codes).unwrap();
+        bytes
+    };
+    let codes: Vec<u8> = (0..128).map(|i| (hash(i) >> 9) as u8).collect();
+    let seeds = [
+        png(png::ColorType::Rgba, png::BitDepth::Sixteen, &codes),
+        png(png::ColorType::Rgb, png::BitDepth::Eight, &codes[..48]),
+        png(png::ColorType::Indexed, png::BitDepth::Two, &[0b0001_1000; 4]),
+        jpeg(0xc0, &[0x11], &[0b0011_1111]),
+        jpeg(0xc0, &[0x22, 0x11, 0x11], &[0, 0b0000_1111]),
+        jpeg(0xc2, &[0x11, 0x11, 0x11], &[0b0001_1111]),
+    ];
+    for seed in &seeds {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        std::fs::write(&path, seed).unwrap();
+        FilePicture::read_texture(&path, None).unwrap();
+    }
+    fuzz("picture", &seeds, |bytes, folder| {
+        let path = folder.join("a");
+        std::fs::write(&path, with_checksums(bytes.to_vec())).unwrap();
+        FilePicture::read_texture(&path, None).is_ok()
     });
 }
 

@@ -223,7 +223,7 @@ impl<'a> CameraPath<'a> {
         let weight = self.spectrum.value_outside();
         self.ask_on((at, wo, bsdf), &Stack::default(), weight, |path| &mut path.draws);
         let (before, mut after) = (self.spectrum.value_outside().max(), self.spectrum);
-        after.scale(bsdf.albedo());
+        after.scale(bsdf.albedo_at(at));
         let left = after.value_outside().max();
         // Mirror images of few samples are not for chance to thin out.
         let chance = if bsdf.is_lambertian() { left / before } else { left / GOES_ON };
