@@ -391,7 +391,7 @@ pub fn reflected(
 ) -> Option<Vec3> {
     let at = SurfacePoint { n: at.n_geometric, ..*at };
     watch.surface(&at, -w, bsdf, spectrum);
-    let (before, albedo) = (spectrum.value(medium).max(), bsdf.albedo());
+    let (before, albedo) = (spectrum.value(medium).max(), bsdf.albedo_at(&at));
     spectrum.scale(albedo);
     let left = spectrum.value(medium).max();
     if left <= 0.0 || !russian_roulette(left / before, spectrum, draws) {
