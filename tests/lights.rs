@@ -219,3 +219,25 @@ fn lights_without_size_behind_clear_bodies_are_told() {
     assert!(!warned(&light("sun", "direction = [0, -1, 0]\nirradiance = 1")));
     assert!(Scene::load(&file(&ball(&glass))).unwrap().is_dark());
 }
+
+/// A room without a lamp in it is black inside, and that is said; with a point of light it is neither.
+#[test]
+fn a_point_lights_a_closed_room() {
+    let room = camera([0.0, 0.0, 0.5], [0.0; 3], 40.0, [4, 4])
+        + &sphere("room", [0.0; 3], 2.0, 16, "matt")
+        + &diffuse("matt", 0.5);
+    let seen = |lights: &str| {
+        let options = Options { spp: Some(16), ..Options::default() };
+        let picture =
+            marmor::render(&file(&(room.clone() + lights)).with(&["method.name=path"]).unwrap(), &options).unwrap();
+        let black = picture.remarks.iter().any(|remark| remark.contains("no lamp is in it"));
+        (channels(&picture.image)[0], black)
+    };
+    let sun = light("sun", "direction = [0, -1, 0]\nirradiance = 1");
+    let (dark, said) = seen(&sun);
+    assert!(dark == 0.0 && said);
+    // All walls see the light at their distance: albedo/π I/d² / (1 - albedo), but for facets that lie a little nearer.
+    let (lit, said) = seen(&light("point", "position = [0, 0, 0]\nintensity = 8"));
+    let wanted = 0.5 / PI * 8.0 / 4.0 / 0.5;
+    assert!((lit / wanted - 1.0).abs() < 0.1 && !said, "{lit} {wanted}");
+}

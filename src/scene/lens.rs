@@ -12,7 +12,7 @@ pub struct Lens {
     pub focus: f32,
     /// Sides of the polygon that it is, 3 or more; 0 for a round one.
     pub blades: u32,
-    /// Angle of the polygon's first corner, counterclockwise from upwards as seen from behind the camera [radians].
+    /// Angle of the polygon's first corner, counterclockwise from upwards as seen from behind the camera \[radians\].
     pub turn: f32,
 }
 

@@ -19,7 +19,7 @@ pub struct LightSource {
     pub at: String,
 }
 
-/// Kinds of light that are no surface. Places are as typed in a file, and relative to the scene's centre in a [`Scene`].
+/// Kinds of light that are no surface. Places are as typed in a file, and relative to the scene's centre in a [`super::Scene`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LightKind {

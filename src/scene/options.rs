@@ -199,7 +199,7 @@ pub struct RenderOptions {
     pub exposure: Option<f64>,
     /// How the samples of a pixel lie around it; a box unless it says.
     pub filter: Option<FilterName>,
-    /// How far a filter that is no box reaches from the pixel's middle [pixels], 0.25 to 8.
+    /// How far a filter that is no box reaches from the pixel's middle \[pixels\], 0.25 to 8.
     pub filter_radius: Option<f64>,
 }
 

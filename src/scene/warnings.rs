@@ -160,7 +160,8 @@ fn shut_in(scene: &Scene) -> Option<String> {
         let opaque = scene.materials[object.material].surface.is_opaque();
         let lamp_near = || {
             let mut others = scene.objects.iter().zip(&boxes);
-            others.any(|(o, b)| shines(o) && b.is_some_and(|b| b.is_near(&own, 0.0)))
+            let mut points = scene.lights.iter().filter_map(|light| light.kind.position());
+            others.any(|(o, b)| shines(o) && b.is_some_and(|b| b.is_near(&own, 0.0))) || points.any(|x| own.contains(x))
         };
         opaque
             && object.findings.open_edges == 0

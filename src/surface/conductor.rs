@@ -46,7 +46,7 @@ fn of_metal(n: f64, k: f64, mu: f64) -> f64 {
     0.5 * across * (1.0 + (t3 - t4) / (t3 + t4))
 }
 
-/// Measured metals: n and k at 610, 550 and 465 nm, between the rows of [HGK74].
+/// Measured metals: n and k at 610, 550 and 465 nm, between the rows of \[HGK74\].
 pub const METALS: [(&str, Reflectance); 4] = [
     ("aluminium", index([1.250, 0.998, 0.688], [7.171, 6.508, 5.570])),
     ("copper", index([0.338, 0.943, 1.158], [3.096, 2.594, 2.451])),

@@ -6,7 +6,7 @@ use crate::math::{Rgb, Vec3};
 use crate::sampling::cosine_hemisphere;
 use std::f32::consts::{FRAC_1_PI, PI};
 
-/// Oren and Nayar's model in Fujii's form with the light that is reflected more than once, so that a white one loses none [PKH24].
+/// Oren and Nayar's model in Fujii's form with the light that is reflected more than once, so that a white one loses none \[PKH24\].
 /// Points face the viewer.
 #[derive(Clone, Copy, Debug)]
 pub struct OrenNayar {

@@ -9,7 +9,7 @@ use crate::sampling::hemisphere;
 use std::f32::consts::FRAC_1_PI;
 
 /// A dielectric coat, smooth or rough, over a matt body: what the coat does not mirror comes back by the body's albedo, in reciprocal
-/// shares, so that a white one loses no light [KSK01]. Points face the viewer.
+/// shares, so that a white one loses no light \[KSK01\]. Points face the viewer.
 #[derive(Clone, Debug)]
 pub struct Plastic {
     albedo: Rgb,
