@@ -155,13 +155,13 @@ fn lights_without_surface_are_limits_of_lamps() {
     }
 }
 
-/// Light adds up: of a wide sun before an even sky, with a second one that covers part of it, and of a spot.
+/// Light adds up: of wide suns that cover each other in part, before a bright sky, and of a spot.
 #[test]
 fn lights_add_up() {
-    let suns = light("sun", "direction = [0, -0.6, -0.8]\nirradiance = 2\nangle = 50")
-        + "[[light]]\nname = \"other\"\ntype = \"sun\"\ndirection = [0, -0.6, -0.4]\nirradiance = 1\nangle = 30\n";
+    let suns = light("sun", "direction = [0, -0.6, -0.8]\nirradiance = 1\nangle = 110")
+        + "[[light]]\nname = \"other\"\ntype = \"sun\"\ndirection = [0, -0.6, -0.4]\nirradiance = 1\nangle = 80\n";
     let spot = light("spot", "position = [1, 3, 2]\nlook_at = [0, 0, 0]\nintensity = 30");
-    let lit = [sky(0.3), suns, spot];
+    let lit = [sky(2.0), suns, spot];
     for (method, spp) in METHODS {
         let set = by(method);
         let set: Vec<&str> = set.iter().map(String::as_str).collect();
