@@ -172,6 +172,16 @@ fn lights_add_up() {
     }
 }
 
+/// Light scattered once beside a model: of a wide sun part is met by chance, whether or not there is a sky that paths go on for.
+#[test]
+fn a_wide_sun_in_a_black_sky_is_met_by_chance_too() {
+    let sun = light("sun", "direction = [-0.6, -0.4, -0.7]\nirradiance = 2\nangle = 150");
+    let text = |sky: &str| ball(&(sun.clone() + sky)).replace("model = \"standard\"", "model = \"better\"");
+    let set = ["method.specular=false", "method.bounces=0", "method.cache_samples=8192"];
+    let [black, faint] = [String::new(), sky(1e-6)].map(|sky| mean(&text(&sky), &set, 32));
+    agree(black, faint, Within { errors: 4.0, noise: 0.01 }, "with a black sky and a faint one");
+}
+
 fn refused(text: &str) -> String {
     let scene = SceneFile::parse(text, Path::new("scene.toml"));
     let loaded =

@@ -115,6 +115,7 @@ fn lamps_on_surfaces_are_worth_what_the_formula_says() {
             + &translucent("haze", "sigma_s = 1e-7\nsigma_a = 0\ng = 0\neta = 1");
         for (method, around) in [
             ("name=direct", ""),
+            ("name=direct,light_samples=8", ""),
             ("name=path", ""),
             ("name=path,bounces=0", ""),
             ("name=volume_path", ""),

@@ -2,8 +2,8 @@
 //!
 //!     cargo run --release --example make_scenes [-- OUT_DIR [--cell MM]]
 //!
-//! OUT_DIR is `scenes` unless given. `--cell` is the edge of the cells that the lotus is cut with: half of it gives
-//! four times as many triangles. Read first: `lotus.rs`, the hero; `polygonise.rs` turns it into triangles.
+//! OUT_DIR is `scenes` unless given. `--cell` is the edge of the cells that the lotus is cut with, and half the edge of those
+//! of the jade ball; half of it gives four times as many triangles. Read first: `lotus.rs`, the hero; `polygonise.rs` turns it into triangles.
 #![allow(clippy::print_stderr)] // a program of its own, outside the library
 
 mod candles;

@@ -26,7 +26,7 @@ impl Direct {
     /// A translucent material whose model does not exist for its medium.
     pub fn new(scene: &Scene, light_samples: u32) -> Result<Self> {
         let light = DirectLight { lights: Lights::new(scene), samples: light_samples };
-        Ok(Self { light, albedo: Albedos::new(scene)?, glossy: Glossy::new(scene) })
+        Ok(Self { light, albedo: Albedos::new(scene)?, glossy: Glossy::new(scene, light_samples) })
     }
 }
 

@@ -77,7 +77,7 @@ impl Subsurface {
             options,
             light: DirectLight { lights, samples: options.light_samples },
             albedo: Albedos::new(scene)?,
-            glossy: if indirect.is_none() { Glossy::new(scene) } else { None },
+            glossy: if indirect.is_none() { Glossy::new(scene, options.light_samples) } else { None },
             plans,
             walked,
             single: if options.single && indirect.is_none() { Single::new(scene, options.seed)? } else { None },

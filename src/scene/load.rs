@@ -42,7 +42,9 @@ impl Scene {
         let placed = meshes(file, folder, repair, &mut said)?;
         let (mut materials, of_objects) = sheets::materials(file, &mut said)?;
         for (material, albedo) in materials.iter_mut().zip(pictures) {
-            material.surface = albedo.map_or_else(|| material.surface.clone(), Surface::textured);
+            if let Some(albedo) = albedo {
+                material.surface = Surface::textured(albedo);
+            }
         }
         let translucent = |entry: &ObjectEntry| file.materials[entry.material].surface.is_translucent();
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();

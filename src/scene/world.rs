@@ -103,7 +103,7 @@ pub struct Emission {
 impl Surface {
     /// Lambertian, both sides alike; `albedo` in [0, 1].
     pub fn diffuse(albedo: Rgb) -> Self {
-        Self { bsdf: Arc::new(Lambertian { albedo }), emission: None, inside: None, clear: None }
+        Self::opaque(Arc::new(Lambertian { albedo }))
     }
 
     /// An opaque surface of any kind.
@@ -113,7 +113,7 @@ impl Surface {
 
     /// Lambertian, both sides alike, with a picture for albedo: of objects with texture coordinates.
     pub fn textured(albedo: Arc<Texture>) -> Self {
-        Self { bsdf: Arc::new(Textured { albedo }), emission: None, inside: None, clear: None }
+        Self::opaque(Arc::new(Textured { albedo }))
     }
 
     /// A lamp, which reflects nothing.

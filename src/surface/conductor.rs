@@ -1,6 +1,6 @@
 //! Metals: smooth mirrors, or rough.
 
-use super::microfacets::{Albedos, Microfacets, RoughMirror, local};
+use super::microfacets::{DirectionalAlbedo, Microfacets, RoughMirror, local};
 use super::{Bsdf, BsdfSample};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3, frame};
@@ -72,12 +72,12 @@ impl Conductor {
     /// `roughness` in [0, 1].
     pub fn new(reflectance: Reflectance, roughness: f32) -> Self {
         let fresnel = |mu| reflectance.at(mu);
-        let smooth = Albedos::new(None, fresnel).mean;
+        let smooth = DirectionalAlbedo::new(None, fresnel).mean;
         let Some(facets) = Microfacets::new(roughness) else {
             return Self { reflectance, roughness, rough: None, mean: smooth };
         };
         let rough = RoughMirror::new(facets, smooth);
-        let mean = Albedos::new(Some(facets), fresnel).mean + rough.mean_again();
+        let mean = DirectionalAlbedo::new(Some(facets), fresnel).mean + rough.mean_again();
         Self { reflectance, roughness, rough: Some(rough), mean }
     }
 }

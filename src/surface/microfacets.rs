@@ -6,7 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Roughness below which a surface is smooth: its mirror image is then blurred by less than rounding makes of densities.
 const SMOOTH: f32 = 1e-3;
-/// Directions of a table of albedos, evenly spaced in the root of the cosine.
+/// Directions of a table of albedo, evenly spaced in the root of the cosine.
 const DIRECTIONS: usize = 128;
 /// Points of the square that an entry of the table is the mean over: multiples of powers of the root of x³ = x + 1, evenly spread.
 const POINTS: usize = 8192;
@@ -46,17 +46,17 @@ impl Microfacets {
         0.5 * ((1.0 + self.alpha * self.alpha * tan2).sqrt() - 1.0)
     }
 
-    /// Reflection by the mirrors, light of each counted whole, and its density by [`Self::sample`] [1/sr]: f cosθ_i / F in place of f. In
-    /// coordinates about n; both directions above the surface.
-    fn reflection(self, wo: Vec3, wi: Vec3) -> (f32, f32) {
+    /// f cosθ_i of single reflections by mirrors of the reflectance `fresnel`, which is asked with cosines at the mirror, and the density of `wi`
+    /// by [`Self::sample`] [1/sr]. In coordinates about n; both directions above the surface.
+    pub fn reflection(self, wo: Vec3, wi: Vec3, fresnel: impl Fn(f32) -> Rgb) -> (Rgb, f32) {
         let h = (wo + wi).normalize_or_zero();
-        let (d, masked) = (self.density(h), self.lambda(wo.z));
-        let scale = d / (4.0 * wo.z);
-        (scale / (1.0 + masked + self.lambda(wi.z)), scale / (1.0 + masked))
+        let (scale, masked) = (self.density(h) / (4.0 * wo.z), self.lambda(wo.z));
+        let f = fresnel(wo.dot(h).clamp(0.0, 1.0)) * (scale / (1.0 + masked + self.lambda(wi.z)));
+        (f, scale / (1.0 + masked))
     }
 
     /// A direction of light by a mirror among those seen from `wo`; it may lie below the surface.
-    fn sample(self, wo: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+    pub fn sample(self, wo: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         // Stretched, the mirrors are those of a sphere: a cap of it is what the direction reaches.
         let stretched = Vec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
         let z = (1.0 - u) * (1.0 + stretched.z) - stretched.z;
@@ -68,21 +68,16 @@ impl Microfacets {
     }
 }
 
-/// Cosine of the angle at the mirror between two directions.
-pub fn half_cosine(wo: Vec3, wi: Vec3) -> f32 {
-    wo.dot((wo + wi).normalize_or_zero()).clamp(0.0, 1.0)
-}
-
 /// Share of light that leaves by one reflection at tiny mirrors of some reflectance, by the cosine of its direction, in one channel each.
 #[derive(Clone, Debug)]
-pub struct Albedos {
+pub struct DirectionalAlbedo {
     /// At cosines ((i + 1/2) / n)² and between them.
     table: Vec<Rgb>,
     /// Mean over directions, weighted by the cosine.
     pub mean: Rgb,
 }
 
-impl Albedos {
+impl DirectionalAlbedo {
     /// Of a surface without roughness if `facets` is `None`; `fresnel` is asked with cosines at the mirror.
     pub fn new(facets: Option<Microfacets>, fresnel: impl Fn(f32) -> Rgb) -> Self {
         let entry = |i: usize| {
@@ -95,23 +90,23 @@ impl Albedos {
                 let u = SPREAD.map(|step| (0.5 + k as f64 * step).fract() as f32);
                 let wi = facets.sample(wo, u);
                 if wi.z > 0.0 {
-                    let (f, pdf) = facets.reflection(wo, wi);
-                    let part = fresnel(half_cosine(wo, wi)) * (f / pdf);
+                    let (f, pdf) = facets.reflection(wo, wi, &fresnel);
+                    let part = f * (1.0 / pdf);
                     (0..3).for_each(|c| sum[c] += f64::from(part[c]));
                 }
             }
             Rgb(sum.map(|s| (s / POINTS as f64) as f32))
         };
         let table: Vec<Rgb> = (0..DIRECTIONS).map(entry).collect();
-        let mut albedos = Self { table, mean: Rgb::BLACK };
+        let mut albedo = Self { table, mean: Rgb::BLACK };
         // ∫ 2 μ E dμ with μ = t².
         let steps = STEPS * DIRECTIONS;
         let part = |i: usize| {
             let t = (i as f32 + 0.5) / steps as f32;
-            albedos.at(t * t) * (4.0 * t * t * t / steps as f32)
+            albedo.at(t * t) * (4.0 * t * t * t / steps as f32)
         };
-        albedos.mean = (0..steps).map(part).fold(Rgb::BLACK, |sum, part| sum + part);
-        albedos
+        albedo.mean = (0..steps).map(part).fold(Rgb::BLACK, |sum, part| sum + part);
+        albedo
     }
 
     /// For the cosine `mu`.
@@ -129,8 +124,8 @@ impl Albedos {
 #[derive(Clone, Debug)]
 pub struct RoughMirror {
     facets: Microfacets,
-    /// Of perfect mirrors, alike in all channels; `None` where what is reflected more than once is left out.
-    perfect: Option<Albedos>,
+    /// Of perfect mirrors, alike in all channels.
+    perfect: DirectionalAlbedo,
     /// Reflectance of what is reflected more than once.
     again: Rgb,
     /// Of what single reflections lose, the share along directions up to the cosine ((i + 1) / n)².
@@ -140,7 +135,7 @@ pub struct RoughMirror {
 impl RoughMirror {
     /// `mean_reflectance`: of a mirror, over all directions by the cosine.
     pub fn new(facets: Microfacets, mean_reflectance: Rgb) -> Self {
-        let perfect = Albedos::new(Some(facets), |_| Rgb::WHITE);
+        let perfect = DirectionalAlbedo::new(Some(facets), |_| Rgb::WHITE);
         let kept = perfect.mean[0];
         let again = mean_reflectance.map(|f| f * f * kept / (1.0 - f * (1.0 - kept)));
         let mut sum = 0.0;
@@ -154,7 +149,7 @@ impl RoughMirror {
         };
         let mut cumulative: Vec<f32> = (0..DIRECTIONS).map(up_to).collect();
         cumulative.iter_mut().for_each(|c| *c /= sum.max(f32::MIN_POSITIVE));
-        Self { facets, perfect: Some(perfect), again, cumulative }
+        Self { facets, perfect, again, cumulative }
     }
 
     /// The part of the table that holds the cosine `mu`, its share of what is lost, and its ends in the square of the cosine.
@@ -175,19 +170,14 @@ impl RoughMirror {
         Vec3::new(r * cos, r * sin, z2.sqrt())
     }
 
-    /// Single reflections alone.
-    pub fn once(facets: Microfacets) -> Self {
-        Self { facets, perfect: None, again: Rgb::BLACK, cumulative: Vec::new() }
-    }
-
     /// Albedo of what is reflected more than once, over all directions by the cosine.
     pub fn mean_again(&self) -> Rgb {
-        self.again * self.perfect.as_ref().map_or(0.0, |perfect| 1.0 - perfect.mean[0])
+        self.again * (1.0 - self.perfect.mean[0])
     }
 
     /// Share of the samples of `wo` that are of light reflected more than once.
     fn share_again(&self, wo: Vec3) -> f32 {
-        self.perfect.as_ref().map_or(0.0, |perfect| 1.0 - perfect.at(wo.z)[0])
+        1.0 - self.perfect.at(wo.z)[0]
     }
 
     /// f cosθ_i and the density [1/sr] of `wi`, in coordinates about n.
@@ -195,13 +185,11 @@ impl RoughMirror {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
-        let (once, pdf) = self.facets.reflection(wo, wi);
-        let once_only = fresnel(half_cosine(wo, wi)) * once;
-        let Some(perfect) = &self.perfect else { return (once_only, pdf) };
+        let (once, pdf) = self.facets.reflection(wo, wi, fresnel);
         let (share, (part, [from, to])) = (self.share_again(wo), self.part(wi.z));
-        let lost = share * self.share_again(wi) / (1.0 - perfect.mean[0]).max(f32::MIN_POSITIVE);
+        let lost = share * self.share_again(wi) / (1.0 - self.perfect.mean[0]).max(f32::MIN_POSITIVE);
         let again = self.again * (lost * wi.z * FRAC_1_PI);
-        (once_only + again, (1.0 - share) * pdf + share * part * wi.z * FRAC_1_PI / (to - from))
+        (once + again, (1.0 - share) * pdf + share * part * wi.z * FRAC_1_PI / (to - from))
     }
 
     /// A direction of light; it may lie below the surface, where its share is none.

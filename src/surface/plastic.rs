@@ -1,6 +1,6 @@
 //! A matt body under a clear coat: plastic, glazed china, varnished wood.
 
-use super::microfacets::{Albedos, Microfacets, RoughMirror, local};
+use super::microfacets::{DirectionalAlbedo, Microfacets, local};
 use super::{Bsdf, BsdfSample};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3, frame};
@@ -15,9 +15,10 @@ pub struct Plastic {
     albedo: Rgb,
     eta: f32,
     roughness: f32,
-    rough: Option<RoughMirror>,
-    /// Of the coat alone, for each direction.
-    coat: Albedos,
+    /// Of the coat; `None` of a smooth one. What its tiny mirrors throw to one another goes into the body.
+    facets: Option<Microfacets>,
+    /// Of the coat alone.
+    coat: DirectionalAlbedo,
 }
 
 impl Plastic {
@@ -25,10 +26,7 @@ impl Plastic {
     pub fn new(albedo: Rgb, eta: f32, roughness: f32) -> Self {
         let fresnel = |mu| Rgb::splat(reflectance(eta, mu));
         let facets = Microfacets::new(roughness);
-        // What its tiny mirrors throw to one another goes into the body.
-        let rough = facets.map(RoughMirror::once);
-        let coat = Albedos::new(facets, fresnel);
-        Self { albedo, eta, roughness, rough, coat }
+        Self { albedo, eta, roughness, facets, coat: DirectionalAlbedo::new(facets, fresnel) }
     }
 
     fn fresnel(&self, mu: f32) -> Rgb {
@@ -60,10 +58,10 @@ impl Plastic {
         }
         let share = self.by_coat(wo);
         let (body, by_body) = (self.body(wo, wi) * wi.z, (1.0 - share) * wi.z * FRAC_1_PI);
-        match &self.rough {
+        match self.facets {
             None => (body, by_body),
-            Some(rough) => {
-                let (coat, by_coat) = rough.eval(wo, wi, |mu| self.fresnel(mu));
+            Some(facets) => {
+                let (coat, by_coat) = facets.reflection(wo, wi, |mu| self.fresnel(mu));
                 (body + coat, by_body + share * by_coat)
             }
         }
@@ -81,12 +79,12 @@ impl Bsdf for Plastic {
         let n = at.normal_seen_from(wo);
         let own = local(n, wo);
         let share = self.by_coat(own);
-        let wi = match &self.rough {
+        let wi = match self.facets {
             None if which < share => {
                 let weight = self.fresnel(n.dot(wo)) * (1.0 / share);
                 return Some(BsdfSample { wi: reflect(wo, n), weight, pdf: 0.0 });
             }
-            Some(rough) if which < share => rough.sample(own, [u, v, which / share]),
+            Some(facets) if which < share => facets.sample(own, [u, v]),
             _ => Vec3::from_array(hemisphere([u, v])),
         };
         let (value, pdf) = self.value(own, wi);
