@@ -149,6 +149,29 @@ fn the_error_told_is_the_error_that_is() {
     assert!(c.width < 4.5 * c.spread, "intervals wider than the spread asks: {c:?}");
 }
 
+/// What a scene converges to hangs on neither the seed nor the samples of a pass: long renders differ by the noise they tell.
+#[test]
+fn renders_of_other_seeds_and_caches_have_one_limit() {
+    let scene = load(
+        &(camera([0.0, 2.0, 6.0], [0.0; 3], 30.0, [24, 16])
+            + &sphere("ball", [0.0; 3], 1.0, 24, "wax")
+            + &rectangle("lamp", [0.0, 5.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "lamp")
+            + &translucent("wax", WAX)
+            + &emissive("lamp", 5)
+            + &sky(1.0)),
+    );
+    let one = |samples: u32, seed: u64| {
+        let method = subsurface(&scene, options(Estimator::Cut, samples, seed));
+        let (image, said) = follow(&method, &scene, &[600], seed).remove(0);
+        (image, said.unwrap().relmse.unwrap().value)
+    };
+    let ((a, noise_a), (b, noise_b)) = (one(2000, 1), one(4000, 2));
+    let between = metrics::compare(&a, &b, None).unwrap().whole.relmse.unwrap().value;
+    println!("{between:.2e} between, told {noise_a:.2e} and {noise_b:.2e}");
+    // The noise told is known to a factor of two or so.
+    assert!(between < 3.0 * (noise_a + noise_b), "{between} of {noise_a} and {noise_b}");
+}
+
 #[test]
 fn nothing_is_told_before_both_halves_have_a_pass() {
     let scene = world("grey", 0.3);

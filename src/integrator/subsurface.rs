@@ -341,11 +341,10 @@ impl Integrator for Subsurface {
                     indirect.survey(view, lights, &self.plans);
                 }
                 if self.indirect.is_some() {
-                    let seed = self.options.seed;
                     let by_model = self.plans.iter().zip(&self.walked).filter(|(_, walked)| !**walked);
                     for plan in by_model.filter_map(|(plan, _)| plan.as_ref()) {
                         let clear = lets_light_through(&plan.body.body, plan.medium());
-                        plan.balanced_by(|| balance(plan, view, clear, seed));
+                        plan.balanced_by(|| balance(plan, view, clear));
                     }
                 }
             });
