@@ -55,6 +55,11 @@ def own_variance(run, other):
     return (run["pictures"].astype(np.float64).var(0, ddof=1) / (mean**2 + 0.01 * mean.mean() ** 2)).mean()
 
 
+def too_short(run):
+    """Whether a part took less than a quarter of the start that is taken off: its seconds are then no measurement."""
+    return run["seconds"] * run["spp"] < run["start"] / 4
+
+
 def ratio(a, b):
     """mean(a) / mean(b) over the picture by channel, with its standard error."""
     x, y = a.mean((1, 2), dtype=np.float64), b.mean((1, 2), dtype=np.float64)
@@ -94,8 +99,11 @@ def agreement(out, seed, ours):
         of_mean, error = ratio(m["pictures"], o["pictures"])
         means.append((of_mean - 1) / error)
         odd = " (!)" if max(abs(np.array(check) - 1)) > 0.2 else ""
+        seconds = f"{cost[0]:.3g} | {cost[1]:.3g} | {cost[1] / cost[0]:.2g}{odd}"
+        if too_short(m) or too_short(o):
+            seconds = " | ".join(["–" if too_short(run) else f"{c:.3g}" for run, c in ((m, cost[0]), (o, cost[1]))] + ["–"])
         print(f"| {name} | {scene['tries']} | {scene['method']} | {z[np.argmax(np.abs(z))]:.1f} | {np.sqrt((z**2).mean()):.2f} | {100 * (np.abs(z) <= bound).mean():.2f} % ({len(z)}) | {s.sum()} "
-              f"| {percent(of_mean, error)} | {cost[0]:.3g} | {cost[1]:.3g} | {cost[1] / cost[0]:.2g}{odd} |")
+              f"| {percent(of_mean, error)} | {seconds} |")
     z = np.concatenate(every)
     print(f"\nall: beyond the bound {beyond} of {len(z)}, within {100 * (1 - beyond / len(z)):.3f} %; beyond 3: {100 * (np.abs(z) > 3).mean():.2f} %; mean z {z.mean():.3f}, rms {np.sqrt((z**2).mean()):.3f}")
     means, calm = np.array(means), ~np.concatenate([s for *_, s in rows])

@@ -9,9 +9,10 @@
     VENV/bin/python benches/mitsuba/sheet.py DIR sheet.png   # all pictures, marmor above Mitsuba
 
 `--seconds` is user CPU for each program and scene; `--models` adds `subsurface` by the default model and by `beam`, `--settings`
-other settings of Mitsuba, each for a quarter of the time;
+other settings of Mitsuba, each for a quarter of the time; `--threads` are marmor's, `--program` is another marmor;
 `--seed` makes other numbers, so that a block can be judged twice. All times are user CPU seconds, which other work on
-the machine changes little. A second or so of start is no part of them: what a render of 1 sample takes is taken off.
+the machine changes little. A second or so of start is no part of them: what a render of 1 sample takes is taken off. Mitsuba wants two CPUs: with one it
+(its thread pool then has no thread) waits for ever.
 """
 
 import argparse
@@ -25,7 +26,6 @@ import mitsuba as mi
 import numpy as np
 
 SIZE, PARTS = 48, 16
-MARMOR = Path(__file__).parents[2] / "target/release/marmor"
 
 
 def user_seconds(who):
@@ -33,6 +33,8 @@ def user_seconds(who):
 
 
 class Marmor:
+    program, threads = Path(__file__).parents[2] / "target/release/marmor", 2
+
     def __init__(self, scene, folder, options=()):
         import write
         self.file, self.options = write.marmor_file(scene, folder, SIZE), options
@@ -40,7 +42,7 @@ class Marmor:
     def render(self, spp, seed):
         with tempfile.TemporaryDirectory() as d:
             before = user_seconds(resource.RUSAGE_CHILDREN)
-            subprocess.run([MARMOR, "render", self.file, "-q", "--threads", "2", "--spp", str(spp), "-D", f"render.seed={seed}", "-o", f"{d}/a.exr", *self.options],
+            subprocess.run([self.program, "render", self.file, "-q", "--threads", str(self.threads), "--spp", str(spp), "-D", f"render.seed={seed}", "-o", f"{d}/a.exr", *self.options],
                            check=True, stderr=subprocess.DEVNULL)
             return np.array(mi.Bitmap(f"{d}/a.exr").convert(mi.Bitmap.PixelFormat.RGB)), user_seconds(resource.RUSAGE_CHILDREN) - before
 
@@ -59,7 +61,7 @@ class Mitsuba:
 
 def parts(program, seconds, seed, count=PARTS):
     """{pictures, spp of each, seconds of a sample of each pixel}"""
-    warm = lambda spp: [program.render(spp, seed + 900 + i)[1] for i in range(2)][1]  # the first of a count compiles
+    warm = lambda spp: min([program.render(spp, seed + 900 + i)[1] for i in range(3)][1:])  # the first of a count compiles
     start, few = warm(1), 5
     while (took := warm(few) - start) < 0.1 and few < 2000:
         few *= 5
@@ -78,7 +80,7 @@ def body_mask(scene, folder):
     place = mi.Point2f(mi.Float(np.ravel(x / SIZE)), mi.Float(np.ravel(y / SIZE)))
     ray, _ = loaded.sensors()[0].sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
     met = loaded.ray_intersect(ray).shape
-    bodies = [s for s in loaded.shapes() if scene["objects"][int(s.id().removeprefix("object"))][1]["kind"] == "medium"]
+    bodies = [s for s in loaded.shapes() if s.id().startswith("object") and scene["objects"][int(s.id().removeprefix("object"))][1]["kind"] == "medium"]
     return sum(np.array(met == mi.ShapePtr(s)) for s in bodies).reshape(SIZE, SIZE) > 0
 
 
@@ -92,10 +94,15 @@ def main():
     a.add_argument("--settings", action="store_true")
     a.add_argument("--also", help="RUN,OPTION,.. : marmor once more with options, kept as RUN and nothing else; for judge.py --ours RUN")
     a.add_argument("--variant", default="llvm_ad_rgb")
+    a.add_argument("--threads", type=int, default=2)
+    a.add_argument("--program", type=Path, default=Marmor.program, help="marmor")
     args = a.parse_args()
     mi.set_variant(args.variant)
+    Marmor.program, Marmor.threads = args.program, args.threads
     import scenes
+    import surfaces
     import write
+    surfaces.register()
     for name in args.names or scenes.SCENES:
         scene, folder = scenes.SCENES[name], args.out / name
         write.meshes(scene, folder)

@@ -1,12 +1,12 @@
-"""The scenes, said once: camera, environment, objects = (mesh, material, body around it or None).
+"""The scenes, said once: camera, environment, lights, objects = (mesh, material, body around it or None).
 
 `SCENES[name]` has `tries` (what it is for), `method` of marmor and the rest. Lengths are mm.
-A medium is sigma_s, sigma_a, g, eta; a clear body has sigma_s = 0.
+A medium is sigma_s, sigma_a, g, eta; a clear body has sigma_s = 0. Lights and `optics` of the camera have marmor's own keys.
 """
 
 import numpy as np
 
-from shapes import ball, box, rectangle, torus
+from shapes import ball, ball_uv, box, rectangle, torus
 
 
 def rgb(x):
@@ -15,6 +15,29 @@ def rgb(x):
 
 def matt(albedo):
     return {"kind": "diffuse", "albedo": rgb(albedo)}
+
+
+def metal(n, k, roughness=0.0):
+    return {"kind": "conductor", "n": rgb(n), "k": rgb(k), "roughness": roughness}
+
+
+def mirror():
+    """Of reflectance 1 from everywhere."""
+    return {"kind": "conductor", "reflectance": 1.0, "roughness": 0.0}
+
+
+def plastic(albedo, eta=1.5, roughness=0.0, ours=False):
+    """`ours`: by surfaces.py in Mitsuba, as rough metals and rough matt surfaces are."""
+    return {"kind": "plastic", "albedo": rgb(albedo), "eta": eta, "roughness": roughness, "ours": ours}
+
+
+def clay(albedo, roughness):
+    return {"kind": "diffuse", "albedo": rgb(albedo), "roughness": roughness}
+
+
+def picture(image, wrap="repeat"):
+    """`image`: a key of PICTURES."""
+    return {"kind": "diffuse", "image": image, "wrap": wrap}
 
 
 def lamp(radiance):
@@ -82,11 +105,12 @@ LID, BASE = ([f for f in CUBE[1] if all(CUBE[0][i][1] == y for i in f)] for y in
 SCENES = {}
 
 
-def add(name, tries, method, objects, sky=None, camera=((0, 2.5, 8.5), (0, 1.1, 0), 28), inside=None, bounces=None, faces=None):
+def add(name, tries, method, objects, sky=None, camera=((0, 2.5, 8.5), (0, 1.1, 0), 28), inside=None, bounces=None, faces=None, lights=(), optics=None):
     """An object is (mesh, material) or (mesh, material, index of the body that it lies in). `inside` is the body that the camera is
-    in; `faces`, for Mitsuba in place of the objects where bodies touch: each (mesh, body inside it or its material, body outside)."""
+    in; `faces`, for Mitsuba in place of the objects where bodies touch: each (mesh, body inside it or its material, body outside);
+    `optics`: of the camera, beside or in place of the pinhole."""
     SCENES[name] = {"tries": tries, "method": method, "objects": [o if len(o) == 3 else (*o, None) for o in objects],
-                    "sky": sky, "camera": camera, "inside": inside, "bounces": bounces, "faces": faces}
+                    "sky": sky, "camera": camera, "inside": inside, "bounces": bounces, "faces": faces, "lights": list(lights), "optics": optics or {}}
 
 
 def opaque():
@@ -173,8 +197,104 @@ def nested():
     add("nested_room", "wax in glass in a closed room", "volume_path", room() + [(BALL, clear(1.5, (0.1, 0.05, 0.01))), (box((-0.45, 0.6, -0.45), (0.45, 1.4, 0.45), 30), WAX, 6), ceiling_lamp(3, 2, 4.9)])
 
 
+def noise(width, height, seed):
+    """Rows of colours from the top down: an even noise on slopes, no two quarters alike."""
+    y, x = np.meshgrid(np.arange(height) / height, np.arange(width) / width, indexing="ij")
+    slopes = np.stack([0.1 + 0.6 * x, 0.1 + 0.6 * y, 0.7 - 0.3 * x - 0.3 * y], axis=-1)
+    return slopes + 0.3 * np.random.default_rng(seed).random((height, width, 3))
+
+
+# 8 bits in sRGB, and linear floats; few pixels, so that what lies between them counts.
+PICTURES = {"tiles.png": noise(13, 9, 1), "blots.exr": noise(10, 14, 2)}
+# n and k of docs/scene-format.md.
+GOLD, COPPER, SILVER = ((0.509, 0.689, 1.640), (3.192, 2.459, 1.745)), ((0.338, 0.943, 1.158), (3.096, 2.594, 2.451)), ((0.266, 0.251, 0.233), (4.093, 3.566, 2.787))
+DISTANT = {"type": "distant", "direction": [-0.6, -1.0, -0.5], "irradiance": [3.0, 2.8, 2.4]}
+SUN_3 = {"type": "sun", "direction": [-0.6, -1.0, -0.5], "irradiance": [3.0, 2.8, 2.4], "angle": 3.0}
+OTHER = {"type": "distant", "direction": [0.8, -1.0, -0.2], "irradiance": [0.2, 0.5, 0.3]}
+SUN_40 = {"type": "sun", "direction": [0.7, -1.0, -0.3], "irradiance": [2.0, 2.8, 3.0], "angle": 40.0}
+POINT = {"type": "point", "position": [1.5, 3.5, 2.5], "intensity": [12.0, 10.0, 7.0]}
+SPOT = {"type": "spot", "position": [-2.0, 4.0, 3.0], "look_at": [0.2, 0.8, 0.2], "cone": 36.0, "penumbra": 0.0, "intensity": [25.0, 30.0, 40.0]}
+SOFT_SPOT = {"type": "spot", "position": [-2.0, 4.0, 3.0], "look_at": [0.2, 0.8, 0.2], "cone": 60.0, "penumbra": 0.8, "intensity": [25.0, 30.0, 40.0]}
+# Name, what it is, lights, whether a lamp, sky.
+EVERY_LIGHT = [("area", "area lamp", [], True, None), ("sky", "even sky", [], False, 1.0), ("image", "picture", [], False, SOFT), ("sun", "sun of 3 degrees", [SUN_3], False, None),
+               ("distant", "distant light", [DISTANT], False, None), ("point", "point", [POINT], False, None), ("spot", "spot without penumbra", [SPOT], False, None)]
+
+
+def delta_lights():
+    things = [floor(), (CUBE, matt((0.7, 0.5, 0.3))), (ball((1.6, 0.5, 1), 0.5), matt(0.6))]
+    for name, tries, lights, _, _ in EVERY_LIGHT[3:]:
+        add(f"cube_{name}" if name != "sun" else "cube_disk", f"cube and ball on a floor, {tries}", "path", things, lights=lights)
+    add("cube_wide", "the same, sun of 40 degrees before an even sky", "path", things, 0.3, lights=[SUN_40])
+    add("cube_penumbra", "the same, spot with a penumbra of 0.8", "path", things, lights=[SOFT_SPOT])
+    add("cube_every", "the same, every kind of light at once", "path", things + [ceiling_lamp(2.0)], 0.2, lights=[SUN_3, OTHER, POINT, SPOT])
+    add("room_point", "closed room, point", "path", room() + [(CUBE, matt(0.6))], lights=[POINT])
+    add("room_spot", "closed room, spot without penumbra", "path", room() + [(CUBE, matt(0.6))], lights=[SPOT])
+
+
+def shiny():
+    cube, right, left = CUBE, ball((1.6, 0.5, 1), 0.5), ball((-1.5, 0.4, 1.2), 0.4)
+    metals = [floor(0.3), (cube, metal(*COPPER, 0.5)), (right, metal(*GOLD)), (left, metal(*SILVER, 0.3))]
+    plastics = [floor(0.3), (cube, plastic((0.7, 0.5, 0.3))), (right, plastic((0.2, 0.4, 0.7), 1.5, 0.1)), (left, plastic(0.0, 1.8, 0.15))]
+    clays = [floor(0.3), (cube, plastic((0.7, 0.5, 0.3), 1.5, 0.5, True)), (right, clay((0.8, 0.4, 0.3), 0.7)), (left, clay(0.95, 1.0))]
+    for kind, what, things in (("metal", "rough copper cube, smooth gold ball, rough silver ball", metals), ("plastic", "smooth cube, rough ball, rough black ball of eta 1.8", plastics),
+                               ("clay", "rough plastic cube, two rough matt balls", clays)):
+        for i, (name, tries, lights, lit, sky) in enumerate(EVERY_LIGHT):
+            add(f"{kind}_{name}", f"{what}; {tries}" if i == 0 else f"the same, {tries}", "path", things + ([ceiling_lamp()] if lit else []), sky, lights=lights)
+        add(f"{kind}_every", "the same, every kind of light at once", "path", things + [ceiling_lamp(2.0)], 0.2, lights=[SUN_3, OTHER, POINT, SOFT_SPOT])
+    add("mirror_room", "closed room, mirror cube of reflectance 1, gold ball, area lamp", "path", room() + [(CUBE, mirror()), (ball((1.6, 0.5, 1), 0.5), metal(*GOLD)), ceiling_lamp(4, 1, 4.9)])
+    add("plastic_room", "closed room, smooth and rough plastic, area lamp", "path", room() + [(CUBE, plastic((0.7, 0.5, 0.3))), (ball((1.6, 0.5, 1), 0.5), plastic(0.8, 1.5, 0.1)), ceiling_lamp(4, 1, 4.9)])
+
+
+def pictures():
+    ground, wall = floor()[0], rectangle((0, 1.6, -2), (2.6, 0, 0), (0, 1.6, 0))
+    things = [((*ground, [[-0.7, -0.4], [2.3, -0.4], [2.3, 1.9], [-0.7, 1.9]]), picture("tiles.png")), ((*wall, [[-0.3, -0.2], [1.2, 0.1], [1.3, 1.2], [-0.2, 1.1]]), picture("blots.exr", "clamp")),
+              ((*BALL, ball_uv()), picture("blots.exr"))]
+    for i, (name, tries, lights, lit, sky) in enumerate(EVERY_LIGHT):
+        what = "floor with 13x9 pixels of sRGB repeated, wall and ball with 10x14 linear ones, clamped and repeated"
+        add(f"picture_{name}", f"{what}; {tries}" if i == 0 else f"the same, {tries}", "path", things + ([ceiling_lamp()] if lit else []), sky, lights=lights)
+
+
+def cameras():
+    panels = SCENES["panels"]["objects"]
+    things = [floor(), (CUBE, matt((0.7, 0.5, 0.3))), (ball((1.6, 0.5, 3), 0.5), metal(*GOLD))]
+    add("lens_panels", "lens of 0.8, the panels, seen", "path", panels, optics={"aperture": 0.8})
+    add("lens_near", "lens of 1.6 focused on a near ball, even sky", "path", things, 1.0, optics={"aperture": 1.6, "focus": 5.6})
+    add("parallel_panels", "parallel rays, the panels, seen", "path", panels, optics={"projection": "orthographic", "height": 4.2})
+    add("parallel_sun", "parallel rays, cube and ball, sun of 3 degrees", "path", things, lights=[SUN_3], optics={"projection": "orthographic", "height": 4.0})
+    add("shift_panels", "view moved by 0.15 and -0.1, the panels, seen", "path", panels, optics={"shift": [0.15, -0.1]})
+
+
+def lit_media():
+    thin = medium((0.5, 1, 3), (0.1, 0.05, 0.02), 0, 1)
+    add("fog_distant", "eta 1, coloured, distant light", "volume_path", [floor(), (CUBE, thin)], lights=[DISTANT])
+    add("fog_point", "eta 1, g = 0.5, point", "volume_path", [floor(), (BALL, medium(3, (0.05, 0.1, 0.2), 0.5, 1))], lights=[POINT])
+    add("fog_spot", "eta 1, spot without penumbra", "volume_path", [floor(), (CUBE, thin)], lights=[SPOT])
+    add("fog_penumbra", "eta 1, g = -0.5, spot with a penumbra of 0.8", "volume_path", [floor(), (BALL, medium(3, 0.1, -0.5, 1))], lights=[SOFT_SPOT])
+    add("fog_disk", "eta 1, sun of 3 degrees", "volume_path", [floor(), (CUBE, thin)], lights=[SUN_3])
+    add("fog_every", "eta 1, every kind of light at once", "volume_path", [floor(), (BALL, thin), ceiling_lamp(2.0)], 0.2, lights=[SUN_3, OTHER, POINT, SOFT_SPOT])
+    add("fog_beam", "eta 1, the camera in the medium, spot without penumbra", "volume_path", [(box((-5, -1, -5), (5, 3.9, 10)), medium((0.1, 0.12, 0.15), (0.01, 0.01, 0.02), 0.5, 1)), (*floor(), 0), (CUBE, matt(0.6), 0)],
+        inside=0, lights=[SPOT])
+    add("fog_shiny", "eta 1, before rough copper and plastic, point", "volume_path", [floor(), (box((-1.2, 0.05, 0.3), (1.2, 1.9, 0.9)), medium((0.4, 0.6, 0.9), (0.1, 0.05, 0.02), 0, 1)), (box((-1.1, 0.1, -1.2), (-0.1, 1.5, -0.2), 20), metal(*COPPER, 0.4)),
+        (ball((0.7, 0.7, -0.7), 0.65), plastic((0.2, 0.4, 0.7), 1.5, 0.1))], lights=[POINT])
+    add("stain_shiny", "clear, absorbing, eta 1, over rough copper and plastic, distant light", "volume_path", [floor(), (box((-1.5, 2.0, -1.5), (1.5, 2.6, 1.5)), clear(1.0, (0.1, 0.5, 1.5))), (box((-1.1, 0.1, -0.7), (-0.1, 1.5, 0.3), 20), metal(*COPPER, 0.4)),
+        (ball((0.7, 0.7, -0.2), 0.65), plastic((0.2, 0.4, 0.7), 1.5, 0.1))], lights=[DISTANT])
+    add("milk_wide", "milk, sun of 40 degrees before an even sky", "volume_path", [floor(), (BALL, MILK)], 0.3, lights=[SUN_40])
+    add("marble_wide", "marble cube, sun of 40 degrees", "volume_path", [floor(), (CUBE, MARBLE)], lights=[SUN_40])
+    add("milk_metal", "milk beside smooth gold and smooth plastic, even sky", "volume_path", [floor(), (ball((-0.8, 0.8, 0), 0.75), MILK), (box((0.1, 0.05, -0.6), (1.3, 1.25, 0.6), 20), plastic((0.7, 0.5, 0.3))), (ball((0.3, 0.35, 1.3), 0.35), metal(*GOLD))], 1.0)
+    add("metal_in_jelly", "rough copper ball in a medium, area lamp", "volume_path", [floor(), (CUBE, JELLY), (ball((0, 0.95, 0), 0.6), metal(*COPPER, 0.4), 1), ceiling_lamp(3, 2)])
+    add("plastic_in_jelly", "smooth plastic ball in a medium, picture", "volume_path", [floor(), (CUBE, JELLY), (ball((0, 0.95, 0), 0.6), plastic((0.7, 0.5, 0.3)), 1)], SOFT)
+    add("glass_point", "clear ball on a floor, point", "volume_path", [floor(), (BALL, clear(1.5, (0.1, 0.05, 0.01)))], lights=[POINT])
+    add("glass_wide", "clear ball on a floor, sun of 40 degrees", "volume_path", [floor(), (BALL, clear(1.5, (0.1, 0.05, 0.01)))], lights=[SUN_40])
+    add("glass_plastic", "clear ball on smooth plastic, beside gold, picture", "volume_path", [(floor()[0], plastic((0.7, 0.5, 0.3))), (BALL, clear(1.5)), (ball((1.6, 0.5, 1), 0.5), metal(*GOLD))], SOFT)
+
+
 opaque()
 glass()
 fog()
 bodies()
 nested()
+delta_lights()
+shiny()
+pictures()
+cameras()
+lit_media()

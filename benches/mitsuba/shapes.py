@@ -38,6 +38,11 @@ def ball(centre, radius, rings=12, segments=20):
     return [[centre[a] + radius * p[a] for a in range(3)] for p in points], faces
 
 
+def ball_uv(rings=12, segments=20):
+    """Texture coordinates of the corners of `ball`: to the right and upwards; its last strip has the whole picture mirrored and squeezed."""
+    return [[0.5, 1.0]] + [[k / segments, 1 - i / rings] for i in range(1, rings) for k in range(segments)] + [[0.5, 0.0]]
+
+
 def torus(centre, large, small, n=24, m=12):
     """About an axis that leans towards the camera."""
     points, c, s = [], math.cos(0.9), math.sin(0.9)
