@@ -3,7 +3,7 @@
 use crate::math::GaussLegendre;
 
 /// Constants of a boundary, by quadrature in f64, once per material. `eta` = n_inside / n_outside.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FresnelMoments {
     /// 2 C_1 met from inside: the diffuse internal reflectance F_dr.
     pub two_c1: f64,
@@ -35,6 +35,15 @@ impl FresnelMoments {
             let inside = 1.0 - 2.0 * outer.c1;
             Self::from_parts(2.0 * outer.c1, 3.0 * outer.c2, inside, inside * eta * eta)
         }
+    }
+
+    /// Of a boundary of index `eta` that lets the share `passed`(μ) of light inside through, by the cosine, and `outside` of even light from
+    /// outside.
+    pub fn of_transmittance(outside: f64, eta: f64, passed: impl Fn(f64) -> f64) -> Self {
+        let inside = outside / (eta * eta);
+        // Most of a polished boundary lies beyond the critical angle: panels that are not in step with it.
+        let three_c2 = 1.0 - GaussLegendre::new(4).integrate_panels(0.0, 1.0, 256, |mu| 3.0 * mu * mu * passed(mu));
+        Self::from_parts(1.0 - inside, three_c2, inside, outside)
     }
 
     fn from_parts(two_c1: f64, three_c2: f64, one_minus_two_c1: f64, four_c_phi_outside: f64) -> Self {

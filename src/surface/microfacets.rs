@@ -2,6 +2,7 @@
 //! drawn among those that are seen [DB23], and what single reflections lose of the light [KC17].
 
 use crate::math::{Rgb, Vec3, frame};
+use rayon::prelude::*;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 /// Roughness below which a surface is smooth: its mirror image is then blurred by less than rounding makes of densities.
@@ -55,16 +56,33 @@ impl Microfacets {
         (f, scale / (1.0 + masked))
     }
 
+    /// Density of mirrors of normal `m` among those seen from `wo` [1/sr], and the share of the light along `wi` that others do not mask.
+    pub fn seen(self, wo: Vec3, m: Vec3, wi: Vec3) -> (f32, f32) {
+        let density = self.density(m) * wo.dot(m).max(0.0) / (wo.z * (1.0 + self.lambda(wo.z)));
+        (density, 1.0 / (1.0 + self.lambda(wi.z)))
+    }
+
+    /// Of the light from `wi` that mirrors seen from `wo` reflect into it, the share that no others mask.
+    pub fn reflected(self, wo: Vec3, wi: Vec3) -> f32 {
+        let masked = 1.0 + self.lambda(wo.z);
+        masked / (masked + self.lambda(wi.z))
+    }
+
     /// A direction of light by a mirror among those seen from `wo`; it may lie below the surface.
-    pub fn sample(self, wo: Vec3, [u, v]: [f32; 2]) -> Vec3 {
+    pub fn sample(self, wo: Vec3, u: [f32; 2]) -> Vec3 {
+        let m = self.normal(wo, u);
+        m * (2.0 * wo.dot(m)) - wo
+    }
+
+    /// The normal of a mirror among those seen from `wo`.
+    pub fn normal(self, wo: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         // Stretched, the mirrors are those of a sphere: a cap of it is what the direction reaches.
         let stretched = Vec3::new(self.alpha * wo.x, self.alpha * wo.y, wo.z).normalize();
         let z = (1.0 - u) * (1.0 + stretched.z) - stretched.z;
         let r = ((1.0 - z) * (1.0 + z)).max(0.0).sqrt();
         let (sin, cos) = (TAU * v).sin_cos();
         let m = Vec3::new(r * cos, r * sin, z) + stretched;
-        let m = Vec3::new(self.alpha * m.x, self.alpha * m.y, m.z.max(0.0)).normalize_or(Vec3::Z);
-        m * (2.0 * wo.dot(m)) - wo
+        Vec3::new(self.alpha * m.x, self.alpha * m.y, m.z.max(0.0)).normalize_or(Vec3::Z)
     }
 }
 
@@ -79,25 +97,29 @@ pub struct DirectionalAlbedo {
 
 impl DirectionalAlbedo {
     /// Of a surface without roughness if `facets` is `None`; `fresnel` is asked with cosines at the mirror.
-    pub fn new(facets: Option<Microfacets>, fresnel: impl Fn(f32) -> Rgb) -> Self {
-        let entry = |i: usize| {
-            let root = (i as f32 + 0.5) / DIRECTIONS as f32;
-            let mu = root * root;
+    pub fn new(facets: Option<Microfacets>, fresnel: impl Fn(f32) -> Rgb + Sync) -> Self {
+        Self::by(|mu| {
             let Some(facets) = facets else { return fresnel(mu) };
             let wo = Vec3::new((1.0 - mu * mu).max(0.0).sqrt(), 0.0, mu);
-            let mut sum = [0.0_f64; 3];
-            for k in 0..POINTS {
-                let u = SPREAD.map(|step| (0.5 + k as f64 * step).fract() as f32);
+            let by_mirror = |u| {
                 let wi = facets.sample(wo, u);
-                if wi.z > 0.0 {
-                    let (f, pdf) = facets.reflection(wo, wi, &fresnel);
-                    let part = f * (1.0 / pdf);
-                    (0..3).for_each(|c| sum[c] += f64::from(part[c]));
+                if wi.z <= 0.0 {
+                    return Rgb::BLACK;
                 }
-            }
-            Rgb(sum.map(|s| (s / POINTS as f64) as f32))
+                let (f, pdf) = facets.reflection(wo, wi, &fresnel);
+                f * (1.0 / pdf)
+            };
+            mean_over_square(by_mirror)
+        })
+    }
+
+    /// By what leaves along the cosines of the table.
+    pub fn by(entry: impl Fn(f32) -> Rgb + Sync) -> Self {
+        let entry = |i: usize| {
+            let root = (i as f32 + 0.5) / DIRECTIONS as f32;
+            entry(root * root)
         };
-        let table: Vec<Rgb> = (0..DIRECTIONS).map(entry).collect();
+        let table: Vec<Rgb> = (0..DIRECTIONS).into_par_iter().map(entry).collect();
         let mut albedo = Self { table, mean: Rgb::BLACK };
         // ∫ 2 μ E dμ with μ = t².
         let steps = STEPS * DIRECTIONS;
@@ -119,6 +141,63 @@ impl DirectionalAlbedo {
     }
 }
 
+/// Mean of `f` over the unit square.
+pub fn mean_over_square(f: impl Fn([f32; 2]) -> Rgb) -> Rgb {
+    let mut sum = [0.0_f64; 3];
+    for k in 0..POINTS {
+        let part = f(SPREAD.map(|step| (0.5 + k as f64 * step).fract() as f32));
+        (0..3).for_each(|c| sum[c] += f64::from(part[c]));
+    }
+    Rgb(sum.map(|s| (s / POINTS as f64) as f32))
+}
+
+/// Where light goes that single reflections or refractions lose: by its share along each direction, which is all at grazing where a surface is nearly smooth.
+#[derive(Clone, Debug)]
+pub struct Lost {
+    /// Share along directions up to the cosine ((i + 1) / n)².
+    cumulative: Vec<f32>,
+    /// Mean of what is lost over directions, weighted by the cosine; above 0.
+    pub mean: f32,
+}
+
+impl Lost {
+    /// `lost` is the share of light along the direction of a cosine.
+    pub fn new(lost: impl Fn(f32) -> f32) -> Self {
+        let mut sum = 0.0;
+        let up_to = |i: usize| {
+            let part = |k: usize| {
+                let t = (i as f32 + (k as f32 + 0.5) / STEPS as f32) / DIRECTIONS as f32;
+                lost(t * t) * t * t * t
+            };
+            sum += (0..STEPS).map(part).sum::<f32>();
+            sum
+        };
+        let mut cumulative: Vec<f32> = (0..DIRECTIONS).map(up_to).collect();
+        let sum = sum.max(f32::MIN_POSITIVE);
+        cumulative.iter_mut().for_each(|c| *c /= sum);
+        Self { cumulative, mean: 4.0 * sum / (STEPS * DIRECTIONS) as f32 }
+    }
+
+    /// Density of the direction of cosine `mu` by [`Self::sample`] [1/sr].
+    pub fn pdf(&self, mu: f32) -> f32 {
+        let i = ((mu.max(0.0).sqrt() * DIRECTIONS as f32) as usize).min(DIRECTIONS - 1);
+        let [from, to] = [i, i + 1].map(|k| (k as f32 / DIRECTIONS as f32).powi(4));
+        let part = self.cumulative[i] - if i == 0 { 0.0 } else { self.cumulative[i - 1] };
+        part * mu * FRAC_1_PI / (to - from)
+    }
+
+    /// A direction above the surface.
+    pub fn sample(&self, [u, v]: [f32; 2]) -> Vec3 {
+        let i = self.cumulative.partition_point(|&c| c <= u).min(DIRECTIONS - 1);
+        let below = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
+        let t = ((u - below) / (self.cumulative[i] - below).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let [from, to] = [i, i + 1].map(|k| (k as f32 / DIRECTIONS as f32).powi(4));
+        let z2 = from + (to - from) * t;
+        let (r, (sin, cos)) = ((1.0 - z2).max(0.0).sqrt(), (TAU * v).sin_cos());
+        Vec3::new(r * cos, r * sin, z2.sqrt())
+    }
+}
+
 /// Reflection by tiny mirrors, and what they throw to one another: the light that single reflections of perfect mirrors would lose comes
 /// back evenly, by reciprocal shares [KC17].
 #[derive(Clone, Debug)]
@@ -128,8 +207,8 @@ pub struct RoughMirror {
     perfect: DirectionalAlbedo,
     /// Reflectance of what is reflected more than once.
     again: Rgb,
-    /// Of what single reflections lose, the share along directions up to the cosine ((i + 1) / n)².
-    cumulative: Vec<f32>,
+    /// Where that goes.
+    lost: Lost,
 }
 
 impl RoughMirror {
@@ -138,36 +217,8 @@ impl RoughMirror {
         let perfect = DirectionalAlbedo::new(Some(facets), |_| Rgb::WHITE);
         let kept = perfect.mean[0];
         let again = mean_reflectance.map(|f| f * f * kept / (1.0 - f * (1.0 - kept)));
-        let mut sum = 0.0;
-        let up_to = |i: usize| {
-            let part = |k: usize| {
-                let t = (i as f32 + (k as f32 + 0.5) / STEPS as f32) / DIRECTIONS as f32;
-                (1.0 - perfect.at(t * t)[0]) * t * t * t
-            };
-            sum += (0..STEPS).map(part).sum::<f32>();
-            sum
-        };
-        let mut cumulative: Vec<f32> = (0..DIRECTIONS).map(up_to).collect();
-        cumulative.iter_mut().for_each(|c| *c /= sum.max(f32::MIN_POSITIVE));
-        Self { facets, perfect, again, cumulative }
-    }
-
-    /// The part of the table that holds the cosine `mu`, its share of what is lost, and its ends in the square of the cosine.
-    fn part(&self, mu: f32) -> (f32, [f32; 2]) {
-        let i = ((mu.max(0.0).sqrt() * DIRECTIONS as f32) as usize).min(DIRECTIONS - 1);
-        let ends = [i, i + 1].map(|k| (k as f32 / DIRECTIONS as f32).powi(4));
-        (self.cumulative[i] - if i == 0 { 0.0 } else { self.cumulative[i - 1] }, ends)
-    }
-
-    /// A direction of light that is reflected more than once.
-    fn sample_again(&self, [u, v]: [f32; 2]) -> Vec3 {
-        let i = self.cumulative.partition_point(|&c| c <= u).min(DIRECTIONS - 1);
-        let below = if i == 0 { 0.0 } else { self.cumulative[i - 1] };
-        let t = ((u - below) / (self.cumulative[i] - below).max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        let [from, to] = [i, i + 1].map(|k| (k as f32 / DIRECTIONS as f32).powi(4));
-        let z2 = from + (to - from) * t;
-        let (r, (sin, cos)) = ((1.0 - z2).max(0.0).sqrt(), (TAU * v).sin_cos());
-        Vec3::new(r * cos, r * sin, z2.sqrt())
+        let lost = Lost::new(|mu| 1.0 - perfect.at(mu)[0]);
+        Self { facets, perfect, again, lost }
     }
 
     /// Albedo of what is reflected more than once, over all directions by the cosine.
@@ -186,16 +237,16 @@ impl RoughMirror {
             return (Rgb::BLACK, 0.0);
         }
         let (once, pdf) = self.facets.reflection(wo, wi, fresnel);
-        let (share, (part, [from, to])) = (self.share_again(wo), self.part(wi.z));
+        let share = self.share_again(wo);
         let lost = share * self.share_again(wi) / (1.0 - self.perfect.mean[0]).max(f32::MIN_POSITIVE);
         let again = self.again * (lost * wi.z * FRAC_1_PI);
-        (once + again, (1.0 - share) * pdf + share * part * wi.z * FRAC_1_PI / (to - from))
+        (once + again, (1.0 - share) * pdf + share * self.lost.pdf(wi.z))
     }
 
     /// A direction of light; it may lie below the surface, where its share is none.
     pub fn sample(&self, wo: Vec3, [u, v, which]: [f32; 3]) -> Vec3 {
         if which < self.share_again(wo) {
-            return self.sample_again([u, v]);
+            return self.lost.sample([u, v]);
         }
         self.facets.sample(wo, [u, v])
     }

@@ -3,10 +3,12 @@
 
 mod boundary;
 mod conductor;
+mod interface;
 mod lambertian;
 mod microfacets;
 mod oren_nayar;
 mod plastic;
+mod rough_boundary;
 mod texture;
 mod textured;
 
@@ -14,9 +16,11 @@ use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 pub use boundary::Boundary;
 pub use conductor::{Conductor, METALS, Reflectance};
+pub use interface::{Interface, RoughReflection};
 pub use lambertian::Lambertian;
 pub use oren_nayar::OrenNayar;
 pub use plastic::Plastic;
+pub use rough_boundary::RoughBoundary;
 use std::sync::Arc;
 pub use texture::{Texture, Wrap};
 pub use textured::Textured;

@@ -1,0 +1,118 @@
+//! What the boundary of a body does to light, in parts: for methods that ask a model for what is inside.
+
+use super::rough_boundary::Side;
+use super::{Boundary, Bsdf, BsdfSample, RoughBoundary};
+use crate::geometry::SurfacePoint;
+use crate::math::{DVec3, Rgb, Vec3};
+use crate::optics::{reflect, reflectance, refract, transmittance};
+use std::sync::Arc;
+
+/// A smooth or a rough boundary.
+#[derive(Clone, Debug)]
+pub struct Interface {
+    /// n_inside / n_outside.
+    pub eta: f32,
+    /// If it is not smooth.
+    pub rough: Option<Arc<RoughBoundary>>,
+}
+
+impl Interface {
+    /// Share in [0, 1] of light along a direction outside, of this cosine to the normal, that goes in; by reciprocity, what of even light inside leaves
+    /// along it.
+    #[inline]
+    pub fn passed(&self, cosine: f32) -> f32 {
+        self.rough.as_ref().map_or_else(|| transmittance(self.eta, cosine), |rough| rough.passed(cosine))
+    }
+
+    /// Share of light from outside that is reflected.
+    #[inline]
+    pub fn reflected(&self, cosine: f32) -> f32 {
+        self.rough.as_ref().map_or_else(|| reflectance(self.eta, cosine), |rough| 1.0 - rough.passed(cosine))
+    }
+
+    /// Share of light along a direction inside that is reflected.
+    pub fn reflected_inside(&self, cosine: f32) -> f32 {
+        let inside = || reflectance(1.0 / self.eta, cosine);
+        self.rough.as_ref().map_or_else(inside, |rough| 1.0 - rough.passed_from_inside(cosine))
+    }
+
+    /// A direction inside of light that gets in from `w` outside, `n` being the unit normal, from numbers in [0, 1); its weight has a mean of 1.
+    pub fn enter(&self, n: Vec3, w: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
+        let Some(rough) = &self.rough else { return Some((refract(w, n, self.eta)?, 1.0)) };
+        let next = rough.sample(&flat(n), w, u).filter(|next| next.wi.dot(n) < 0.0)?;
+        Some((next.wi, next.weight[0] / rough.passed(w.dot(n))))
+    }
+
+    /// A direction of light that is reflected which comes from `w` outside; its weight has a mean of 1.
+    pub fn mirror(&self, n: Vec3, w: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
+        let Some(rough) = &self.rough else { return Some((reflect(w, n), 1.0)) };
+        let next = RoughReflection(rough).sample(&flat(n), w, u).filter(|next| next.wi.dot(n) > 0.0)?;
+        Some((next.wi, next.weight[0] / (1.0 - rough.passed(w.dot(n)))))
+    }
+
+    /// Which way light goes on that goes to `wo` from a point of the boundary, from either side.
+    pub fn cross(&self, at: &SurfacePoint, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
+        self.rough
+            .as_ref()
+            .map_or_else(|| Boundary { eta: self.eta }.sample(at, wo, u), |rough| rough.sample(at, wo, u))
+    }
+}
+
+fn flat(n: Vec3) -> SurfacePoint {
+    SurfacePoint { x: DVec3::ZERO, n_geometric: n, n, uv: [0.0; 2], error: 0.0 }
+}
+
+/// What a rough boundary reflects, without what goes through.
+#[derive(Clone, Copy, Debug)]
+pub struct RoughReflection<'a>(pub &'a RoughBoundary);
+
+impl RoughReflection<'_> {
+    /// Share of the samples that are reflected once.
+    fn once(side: &Side, cosine: f32) -> f32 {
+        let (once, again) = (side.once.at(cosine)[0], side.again(cosine) * (1.0 - side.through));
+        if once + again > 0.0 { once / (once + again) } else { 0.0 }
+    }
+
+    /// f cosθ_i and the density of `wi` [1/sr], about the normal on the side of `wo`.
+    fn value(&self, side: &Side, wo: Vec3, wi: Vec3) -> (f32, f32) {
+        if wo.z <= 0.0 || wi.z <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let [(once, by_mirror), (again, by_lost)] = self.0.reflection(side, wo, wi);
+        let share = Self::once(side, wo.z);
+        (once + again, share * by_mirror + (1.0 - share) * by_lost)
+    }
+}
+
+impl Bsdf for RoughReflection<'_> {
+    fn eval(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> Rgb {
+        let ((side, _, n), local) = (self.0.seen_from(at, wo), super::microfacets::local);
+        let wi = local(n, wi);
+        if wi.z > 0.0 { Rgb::splat(self.value(side, local(n, wo), wi).0 / wi.z) } else { Rgb::BLACK }
+    }
+
+    fn sample(&self, at: &SurfacePoint, wo: Vec3, [u, v, which]: [f32; 3]) -> Option<BsdfSample> {
+        let (side, _, n) = self.0.seen_from(at, wo);
+        let own = super::microfacets::local(n, wo);
+        let wi = if which < Self::once(side, own.z) {
+            self.0.facets().sample(own, [u, v])
+        } else {
+            side.lost.sample([u, v])
+        };
+        let (value, pdf) = self.value(side, own, wi);
+        (pdf > 0.0).then(|| BsdfSample { wi: crate::math::frame(n) * wi, weight: Rgb::splat(value / pdf), pdf })
+    }
+
+    fn pdf(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> f32 {
+        let (side, _, n) = self.0.seen_from(at, wo);
+        self.value(side, super::microfacets::local(n, wo), super::microfacets::local(n, wi)).1
+    }
+
+    fn albedo(&self) -> Rgb {
+        self.0.albedo()
+    }
+
+    fn text(&self) -> String {
+        format!("what is reflected of a {}", self.0.text())
+    }
+}
