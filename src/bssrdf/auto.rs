@@ -1,13 +1,13 @@
 //! The model for a medium: what the validity chart of `optics` trusts most, or a slab where both faces count.
 
-use super::{ModelKind, ModelName, ModelOption};
+use super::{ModelKind, ModelName, ModelOption, ModelOptions};
 use crate::optics::{ChannelOptics, Medium, Trust};
 use crate::words::{albedo, digits};
 
 /// Whichever [`choose`] finds best.
 pub(super) static MODEL: ModelKind = ModelKind {
     takes: &[ModelOption::Thickness],
-    ..ModelKind::new("auto", |medium, options| choose(medium, options.thickness).name.build(medium, options))
+    ..ModelKind::new("auto", |medium, options| choose_behind(medium, options).name.build(medium, options))
 };
 
 /// A model and the reason for it.
@@ -32,6 +32,16 @@ impl std::fmt::Display for Choice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "auto -> {} ({})", self.name.name(), self.why)
     }
+}
+
+/// The same for what is made with `options`: the models of rough boundaries are few.
+pub fn choose_behind(medium: &Medium, options: &ModelOptions) -> Choice {
+    let choice = choose(medium, options.thickness);
+    if options.boundary.is_none() || choice.name.takes(ModelOption::Boundary) {
+        return choice;
+    }
+    let why = format!("`{}`, which would be nearer, knows of smooth boundaries alone", choice.name.name());
+    Choice { name: ModelName::STANDARD, why, trusted: choice.trusted }
 }
 
 /// The best model there is for `medium`, in a slab of `thickness` \[unit\] if the object is one.

@@ -2,14 +2,17 @@
 
 use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, in_mean_free_paths, left};
 use super::standard::length_log2;
-use super::{Claims, ModelKind, ModelName};
+use super::{Claims, ModelKind, ModelName, ModelOption};
 use crate::math::{Rgb, exp2_m1, times_exp2};
 use crate::optics::{FresnelMoments, Medium, better_total};
 use std::f64::consts::{LOG2_E, PI};
 
 pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &[ModelOption::Boundary],
     evidence: |_| Some("better"),
-    ..ModelKind::new("better", |medium, options| Ok(Box::new(BetterDipole::new(medium, options.exit_normalisation))))
+    ..ModelKind::new("better", |medium, options| {
+        Ok(Box::new(BetterDipole::behind(medium, &options.moments(medium), options.exit_normalisation)))
+    })
 };
 
 /// The better dipole \[dEo12\]: Grosjean's diffusion coefficient, the boundary with both Fresnel moments, and an exitance
@@ -54,7 +57,11 @@ pub struct BetterChannel {
 impl BetterDipole {
     /// See [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool) -> Self {
-        let moments = FresnelMoments::new(f64::from(medium.eta));
+        Self::behind(medium, &FresnelMoments::new(f64::from(medium.eta)), exit_normalisation)
+    }
+
+    /// The same behind a boundary of these moments.
+    pub fn behind(medium: &Medium, moments: &FresnelMoments, exit_normalisation: bool) -> Self {
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
         let mut decay = f64::INFINITY;
         let each = medium.channels().map(|k| {
@@ -80,7 +87,7 @@ impl BetterDipole {
                 columns: Pairs::of(each),
                 grey: medium.is_grey(),
                 decay: decay as f32,
-                total: Rgb::from_fn(|c| better_total(&medium.channel(c), &moments) as f32),
+                total: Rgb::from_fn(|c| better_total(&medium.channel(c), moments) as f32),
                 exitance: (PI * exit) as f32,
             },
         }

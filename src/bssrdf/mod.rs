@@ -27,7 +27,7 @@ model::registry! {
 }
 
 use crate::math::{Level, Rgb, Vec3};
-pub use auto::{Choice, choose};
+pub use auto::{Choice, choose, choose_behind};
 pub use beam::{BeamChannel, PhotonBeamDiffusion};
 pub use better::BetterDipole;
 pub use channel::ChannelMedium;

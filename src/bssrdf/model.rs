@@ -2,7 +2,7 @@
 
 use super::Bssrdf;
 use crate::error::{Error, Result};
-use crate::optics::Medium;
+use crate::optics::{FresnelMoments, Medium};
 
 /// A row of the registry: what is known of a model before it is made of a medium.
 #[non_exhaustive]
@@ -52,6 +52,8 @@ pub enum ModelOption {
     Width,
     /// Light that leaves by the far face, see [`super::Slab::transmitted`].
     Transmitted,
+    /// [`ModelOptions::boundary`].
+    Boundary,
 }
 
 /// What a model is made with beside its medium. Each heeds what [`ModelKind::takes`] says.
@@ -68,6 +70,8 @@ pub struct ModelOptions {
     pub calibrated: bool,
     /// The extinction in the near-field correction of photon beams.
     pub kappa: KappaExtinction,
+    /// Moments of a boundary that is not smooth; those of a smooth one if absent.
+    pub boundary: Option<FresnelMoments>,
 }
 
 impl ModelOptions {
@@ -78,7 +82,13 @@ impl ModelOptions {
         eta_far: None,
         calibrated: false,
         kappa: KappaExtinction::Reduced,
+        boundary: None,
     };
+
+    /// Moments of the boundary of `medium`.
+    pub fn moments(&self, medium: &Medium) -> FresnelMoments {
+        self.boundary.unwrap_or_else(|| FresnelMoments::new(f64::from(medium.eta)))
+    }
 
     /// A sheet of `thickness` \[unit\].
     pub fn thick(thickness: f32) -> Self {
@@ -145,6 +155,12 @@ impl ModelName {
     /// # Errors
     /// A slab without a thickness, and all that [`super::Slab::between`] refuses.
     pub fn build(self, medium: &Medium, options: &ModelOptions) -> Result<Box<dyn Bssrdf>> {
+        if options.boundary.is_some() && self != Self::AUTO && !self.takes(ModelOption::Boundary) {
+            return Err(Error::scene(format!(
+                "the model `{}` knows of smooth boundaries alone: take `standard`, `better` or `normalised`, name no model, or leave out `roughness`",
+                self.name()
+            )));
+        }
         (self.0.build)(medium, options)
     }
 }
@@ -215,6 +231,29 @@ mod tests {
         assert_eq!(make(ModelName::AUTO, None).unwrap(), choose(&medium, None).name);
         for name in ModelName::half_spaces() {
             assert_eq!(make(name, None).unwrap(), name);
+        }
+    }
+
+    /// A boundary that lets more through keeps less light in, and models that know of none but smooth ones say so.
+    #[test]
+    fn models_take_the_moments_of_a_boundary() {
+        let medium = Medium::reduced(Rgb::splat(2.0), Rgb::splat(0.2), 1.5).unwrap();
+        // All that is not totally reflected goes through.
+        let critical = (1.0_f64 - 1.0 / 2.25).sqrt();
+        let boundary = Some(FresnelMoments::of_transmittance(1.0, 1.5, |mu| if mu > critical { 1.0 } else { 0.0 }));
+        let with = |name: ModelName| name.build(&medium, &ModelOptions { boundary, ..ModelOptions::DEFAULT });
+        let without = |name: ModelName| name.build(&medium, &ModelOptions::DEFAULT).unwrap();
+        for name in [ModelName::STANDARD, ModelName::BETTER, ModelName::NORMALISED, ModelName::AUTO] {
+            assert!(with(name).unwrap().total()[0] > 1.01 * without(name).total()[0], "{name:?}");
+        }
+        // By hand: (α′/2) (exp(-s) + exp(-s z_v)), A = (1 + 2 C_1) / (1 - 2 C_1) with 2 C_1 = 1 - 1 / 2.25.
+        let (alpha, a) = (2.0_f64 / 2.2, (2.0 - 1.0 / 2.25) * 2.25);
+        let s = (3.0 * (1.0 - alpha)).sqrt();
+        let total = 0.5 * alpha * ((-s).exp() + (-s * (1.0 + 4.0 / 3.0 * a)).exp());
+        assert!((f64::from(with(ModelName::STANDARD).unwrap().total()[0]) / total - 1.0).abs() < 1e-5);
+        assert_eq!(with(ModelName::AUTO).unwrap().name(), ModelName::STANDARD);
+        for name in [ModelName::BEAM, ModelName::DIRECTIONAL] {
+            assert!(with(name).err().unwrap().to_string().contains("smooth boundaries alone"), "{name:?}");
         }
     }
 

@@ -53,10 +53,10 @@ impl std::str::FromStr for WidthFit {
 }
 
 pub(super) static MODEL: ModelKind = ModelKind {
-    takes: &[ModelOption::Width],
+    takes: &[ModelOption::Width, ModelOption::Boundary],
     evidence: |_| Some("normalised"),
     ..ModelKind::new("normalised", |medium, options| {
-        Ok(Box::new(NormalisedDiffusion::new(medium, options.exit_normalisation)))
+        Ok(Box::new(NormalisedDiffusion::behind(medium, &options.moments(medium), options.exit_normalisation)))
     })
 };
 
@@ -95,14 +95,18 @@ impl NormalisedDiffusion {
     /// From a medium: A is the standard dipole's total, l the diffusion length (at most 40 transport mean free
     /// paths): the variant nearest to transport behind a boundary. See [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool) -> Self {
-        let moments = FresnelMoments::new(f64::from(medium.eta));
+        Self::behind(medium, &FresnelMoments::new(f64::from(medium.eta)), exit_normalisation)
+    }
+
+    /// The same behind a boundary of these moments.
+    pub fn behind(medium: &Medium, moments: &FresnelMoments, exit_normalisation: bool) -> Self {
         let fit = WidthFit::DiffusionLength;
         let channels = medium.channels().map(|k| {
-            let albedo = standard_total(&k, &moments);
+            let albedo = standard_total(&k, moments);
             let length = (1.0 / k.relative_decay()).min(LONGEST_DIFFUSION) / k.sigma_t_prime;
             (albedo, length / fit.s(albedo))
         });
-        Self::from_widths(channels, medium.eta, exit_normalisation)
+        Self::from_widths(channels, moments, exit_normalisation)
     }
 
     /// From the albedo A in [0, 1] and the length l \[unit\] that `fit` expects, behind a boundary `eta`.
@@ -125,12 +129,11 @@ impl NormalisedDiffusion {
             let a = f64::from(albedo[c]);
             (a, f64::from(length[c]) / fit.s(a))
         });
-        Ok(Self::from_widths(channels, eta, exit_normalisation))
+        Ok(Self::from_widths(channels, &FresnelMoments::new(f64::from(eta)), exit_normalisation))
     }
 
     /// From (A, d \[unit\]) per channel; an infinite d stands for no medium.
-    fn from_widths(channels: [(f64, f64); 3], eta: f32, exit_normalisation: bool) -> Self {
-        let moments = FresnelMoments::new(f64::from(eta));
+    fn from_widths(channels: [(f64, f64); 3], moments: &FresnelMoments, exit_normalisation: bool) -> Self {
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
         let each = channels.map(|(albedo, d)| {
             if !d.is_finite() {

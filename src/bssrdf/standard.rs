@@ -1,15 +1,16 @@
 //! The standard dipole.
 
 use super::radial::{Channel, Channels, Columns, DistanceOnly, Formula, columns, finite, in_mean_free_paths, left};
-use super::{Claims, ModelKind, ModelName};
+use super::{Claims, ModelKind, ModelName, ModelOption};
 use crate::math::{Rgb, exp2, times_exp2};
 use crate::optics::{FresnelMoments, Medium, Reduced, standard_total};
 use std::f64::consts::{LOG2_E, PI};
 
 pub(super) static MODEL: ModelKind = ModelKind {
+    takes: &[ModelOption::Boundary],
     evidence: |_| Some("standard"),
     ..ModelKind::new("standard", |medium, options| {
-        Ok(Box::new(StandardDipole::new(medium, options.exit_normalisation)))
+        Ok(Box::new(StandardDipole::behind(medium, &options.moments(medium), options.exit_normalisation)))
     })
 };
 
@@ -47,7 +48,11 @@ pub struct Pole {
 impl StandardDipole {
     /// See [`super::ModelOptions`].
     pub fn new(medium: &Medium, exit_normalisation: bool) -> Self {
-        let moments = FresnelMoments::new(f64::from(medium.eta));
+        Self::behind(medium, &FresnelMoments::new(f64::from(medium.eta)), exit_normalisation)
+    }
+
+    /// The same behind a boundary of these moments.
+    pub fn behind(medium: &Medium, moments: &FresnelMoments, exit_normalisation: bool) -> Self {
         let exit = if exit_normalisation { moments.four_c_phi_outside } else { 1.0 };
         let z_virtual = 1.0 + 4.0 / 3.0 * moments.a_groenhuis();
         let each = medium.channels().map(|k| Pole {
@@ -64,7 +69,7 @@ impl StandardDipole {
                 columns: Poles::of(each),
                 grey: medium.is_grey(),
                 decay: medium.sigma_tr().min(),
-                total: Rgb::from_fn(|c| standard_total(&medium.channel(c), &moments) as f32),
+                total: Rgb::from_fn(|c| standard_total(&medium.channel(c), moments) as f32),
                 exitance: (PI * exit) as f32,
             },
         }

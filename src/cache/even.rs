@@ -6,7 +6,6 @@ use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, S
 use crate::bssrdf::{Exit, ModelName, ModelOptions, Partition};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3, Vec4};
-use crate::optics::FresnelMoments;
 use crate::sampling::{CacheStream, PixelStream, Points, cosine_hemisphere};
 use crate::scene::{Estimator, View};
 use crate::tally::Tally;
@@ -42,11 +41,14 @@ pub fn balance(plan: &Plan, view: View<'_>, clear: bool) -> Option<Balance> {
     let count = if plan.near.is_some() { NEAR[0] } else { POINTS };
     let surface = view.scene.surface(body.object()).inside.as_ref()?;
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
-    let exit = if normalised { FresnelMoments::new(body.eta.into()).four_c_phi_outside } else { 1.0 };
+    let options = surface.options();
+    let exit = if normalised { options.moments(&surface.medium).four_c_phi_outside } else { 1.0 };
     let own = body.model.total_of_all_faces();
     let sheet = own != body.model.total();
     // What begins with light scattered twice competes with light scattered once too: the standard dipole has about the total of both.
-    let standard = ModelName::STANDARD.build(&surface.medium, &ModelOptions::DEFAULT).ok();
+    let standard = ModelName::STANDARD
+        .build(&surface.medium, &ModelOptions { boundary: options.boundary, ..ModelOptions::DEFAULT })
+        .ok();
     let total = standard.filter(|_| !body.model.claims().first_order).map_or(own, |model| model.total());
     let on_a_plane = own.map(|total| (f64::from(total) / (PI * exit)) as f32);
     let mesh = &view.scene.objects[body.object() as usize].mesh;

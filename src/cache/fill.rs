@@ -5,10 +5,11 @@ use crate::bssrdf::{Bssrdf, Entry};
 use crate::geometry::{AreaSample, AreaTable, Mesh, SurfacePoint, Union};
 use crate::light::{Arrival, Lights, Met};
 use crate::math::{Rgb, Vec3};
-use crate::optics::{refract, transmittance};
+use crate::optics::refract;
 use crate::query::Ray;
 use crate::sampling::CacheStream;
 use crate::scene::{Body, Scene, View};
+use crate::surface::Interface;
 use crate::tally::Tally;
 use rayon::prelude::*;
 use std::f32::consts::PI;
@@ -22,15 +23,18 @@ pub struct CachedBody {
     pub union: Option<Arc<Union>>,
     /// Its BSSRDF, which says at what depth a sample stands.
     pub model: Box<dyn Bssrdf>,
-    /// Its relative index of refraction.
-    pub eta: f32,
+    /// Its boundary.
+    pub boundary: Interface,
 }
 
 impl CachedBody {
     /// Of object number `object` by `model`; `None` where that bounds no body.
     pub fn new(scene: &Scene, object: u32, model: Box<dyn Bssrdf>) -> Option<Self> {
         let body = scene.body(object)?.clone();
-        Some(Self { eta: scene.surface(object).medium()?.eta, body, union: scene.union(object).cloned(), model })
+        let surface = scene.surface(object);
+        let rough = surface.inside.as_ref().and_then(|inside| inside.rough.clone());
+        let boundary = Interface { eta: surface.medium()?.eta, rough };
+        Some(Self { boundary, body, union: scene.union(object).cloned(), model })
     }
 
     /// Index of its surface.
@@ -55,8 +59,12 @@ impl CachedBody {
     /// Light as it enters at `at`, flat as the triangle it lies on, seen from there in the unit direction `w`: `irradiance` times
     /// `weight` [unit²] before the boundary, `u` in [0, 1) for the depth. `None` where it is totally reflected.
     pub fn enters(&self, at: &SurfacePoint, w: Vec3, (irradiance, weight): (Rgb, f32), u: f32) -> Option<CachedSample> {
-        let refracted = refract(w, at.n, self.eta)?;
-        let flux = irradiance * (transmittance(self.eta, w.dot(at.n)) * weight);
+        // The models of rough boundaries do not ask where light goes inside.
+        let refracted = match self.boundary.rough {
+            None => refract(w, at.n, self.boundary.eta)?,
+            Some(_) => -at.n,
+        };
+        let flux = irradiance * (self.boundary.passed(w.dot(at.n)) * weight);
         (!flux.is_black()).then(|| CachedSample {
             entry: Entry { x: (at.x - self.table().centre()).as_vec3(), n: at.n, w: refracted },
             depth: self.model.sample_depth(u),

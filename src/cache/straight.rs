@@ -3,7 +3,7 @@
 use super::Plan;
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
-use crate::optics::{reflect, reflectance, refract, transmittance};
+use crate::optics::reflect;
 use crate::query::Ray;
 use crate::sampling::cosine_hemisphere;
 use crate::scene::View;
@@ -20,11 +20,11 @@ pub fn straight(plan: &Plan, view: View<'_>, at: &SurfacePoint, u: [f32; 2]) -> 
     for k in 0..DIRECTIONS {
         let shifted = [f32::from(k) / f32::from(DIRECTIONS), f32::from(k) * 0.618_034];
         let w = cosine_hemisphere(at.n, [0, 1].map(|i| (u[i] + shifted[i]).fract()));
-        let passed = transmittance(plan.body.eta, w.dot(at.n));
-        if let Some(inside) = refract(w, at.n, plan.body.eta) {
-            sum += through(plan, view, at, inside) * passed;
-            entered += passed;
+        let passed = plan.body.boundary.passed(w.dot(at.n));
+        if let Some((inside, weight)) = plan.body.boundary.enter(at.n, w, [shifted[1].fract(), shifted[0], u[0]]) {
+            sum += through(plan, view, at, inside) * (passed * weight);
         }
+        entered += passed;
     }
     if entered > 0.0 { sum * (1.0 / entered) } else { Rgb::BLACK }
 }
@@ -48,7 +48,7 @@ fn through(plan: &Plan, view: View<'_>, at: &SurfacePoint, mut w: Vec3) -> Rgb {
             return out;
         }
         left = left * sigma_t.map(|s| (-s * t).exp());
-        let mirrored = reflectance(1.0 / plan.body.eta, cosine);
+        let mirrored = plan.body.boundary.reflected_inside(cosine);
         out += left * (1.0 - mirrored);
         left *= mirrored;
         w = reflect(-w, -there.n_geometric);

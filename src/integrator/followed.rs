@@ -8,9 +8,10 @@ use crate::bssrdf::{Entry, Exit};
 use crate::cache::{CachedSample, Plan};
 use crate::geometry::{Patches, SurfacePoint};
 use crate::math::{Rgb, Vec3, hash_combine};
-use crate::optics::{reflect, reflectance, refract, transmittance};
+use crate::optics::refract;
 use crate::query::Ray;
 use crate::sampling::{PixelStream, cosine_hemisphere};
+use crate::surface::Interface;
 use crate::tally::Tally;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -148,6 +149,19 @@ impl Followed<'_> {
         self.follow_open(found);
     }
 
+    /// Where light goes on that comes from `w` and is reflected; its weight has a mean of 1.
+    pub fn mirror(
+        &self,
+        boundary: &Interface,
+        at: &SurfacePoint,
+        w: Vec3,
+        draws: &mut PathSampler,
+    ) -> Option<(Vec3, f32)> {
+        let smooth = boundary.rough.is_none();
+        let u = if smooth { [0.0; 3] } else { [draws.number(), draws.number(), draws.number()] };
+        boundary.mirror(at.n, w, u)
+    }
+
     /// Light that has passed the boundary, without a sample: what the cache has no need of.
     pub fn pass_on(&self, arrived: &Arrived<'_>, mut draws: PathSampler, found: &mut Found) {
         found.left = self.bounces;
@@ -168,9 +182,9 @@ impl Followed<'_> {
         let &Arrived { plan, at, w, flux } = arrived;
         let sample = plan.body.enters(&at, w, (flux, 1.0), depth);
         found.rows.extend(sample.map(|sample| (plan.body.object(), sample)));
-        if draws.number() < reflectance(plan.body.eta, w.dot(at.n)) {
-            let away = reflect(w, at.n);
-            return Some((Ray::new(at.leave(away), away), flux));
+        if draws.number() < plan.body.boundary.reflected(w.dot(at.n)) {
+            let (away, weight) = self.mirror(&plan.body.boundary, &at, w, draws)?;
+            return Some((Ray::new(at.leave(away), away), flux * weight));
         }
         if self.walked[plan.body.object() as usize].is_some() {
             return self.walk(arrived, draws, found);
@@ -195,7 +209,10 @@ impl Followed<'_> {
         let out = SurfacePoint { n: step.at.n_geometric, ..step.at };
         let away = cosine_hemisphere(out.n, draws.pair());
         // The boundary has been passed by the choice not to mirror.
-        let refracted = refract(w, at.n, plan.body.eta)?;
+        let refracted = match plan.body.boundary.rough {
+            None => refract(w, at.n, plan.body.boundary.eta)?,
+            Some(_) => -at.n,
+        };
         let sample = CachedSample {
             entry: Entry { x: Vec3::ZERO, n: at.n, w: refracted },
             depth: plan.body.model.sample_depth(draws.number()),
@@ -204,7 +221,7 @@ impl Followed<'_> {
         let exit = Exit { x: Vec3::ZERO, n: out.n, w: away };
         let passed = plan.near_part(near, &exit, &sample, (at.x - step.place).as_vec3(), &mut found.tally)
             * plan.balance_at(step.place, exit.n);
-        let left = passed * transmittance(plan.body.eta, away.dot(out.n));
+        let left = passed * plan.body.boundary.passed(away.dot(out.n));
         let chance = (left.max() / flux.max()).min(1.0);
         let goes_on = draws.number() < chance;
         goes_on.then(|| (Ray::new(out.leave(away), away), left * (1.0 / chance)))
@@ -213,7 +230,12 @@ impl Followed<'_> {
     /// What the model of the body lacks: light scattered less often, until it leaves.
     fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
-        let inside = refract(w, at.n, plan.body.eta)?;
+        let boundary = &plan.body.boundary;
+        let (inside, weight) = match boundary.rough {
+            None => (refract(w, at.n, boundary.eta)?, 1.0),
+            Some(_) => boundary.enter(at.n, w, [draws.number(), draws.number(), draws.number()])?,
+        };
+        let flux = flux * weight;
         let from = (at.leave(inside), inside);
         let object = plan.body.object();
         if let (Some(Some(body)), Some(Some(patches))) =

@@ -14,7 +14,6 @@ use crate::cache::{Cache, CachedSample, Detail, GatherPoint, Plan, Scratch, Subs
 use crate::geometry::{Patches, SurfacePoint};
 use crate::light::Lights;
 use crate::math::{hash_combine, unit_f32};
-use crate::optics::{reflect, reflectance, transmittance};
 use crate::query::Ray;
 use crate::sampling::{CacheStream, PixelStream, Points, Turn, cosine_hemisphere};
 use crate::scene::{Object, Scene};
@@ -191,7 +190,7 @@ impl Indirect {
             let builder = plan.builder(view, lights, stream, plan.density());
             let entering = |i: u64| {
                 let (at, w, flux) = builder.arriving(i, &mut Tally::default())?;
-                let passed = transmittance(plan.body.eta, w.dot(at.n)) / self.count as f32;
+                let passed = plan.body.boundary.passed(w.dot(at.n)) / self.count as f32;
                 (!flux.is_black()).then(|| (at.x, flux * passed))
             };
             let entering: Vec<_> = (0..u64::from(self.count)).into_par_iter().filter_map(entering).collect();
@@ -339,10 +338,12 @@ impl Round<'_> {
             }
             let flux = flux * (1.0 / self.of.count as f32);
             let draws = PathSampler::new(&[], hash_combine(key, i));
-            let mirrored = reflectance(plan.body.eta, w.dot(at.n));
-            let away = reflect(w, at.n);
-            self.followed.follow(Ray::new(at.leave(away), away), flux * mirrored, draws.fork(0), found);
-            let passed = transmittance(plan.body.eta, w.dot(at.n));
+            let mirrored = plan.body.boundary.reflected(w.dot(at.n));
+            let mut own = draws.fork(0);
+            if let Some((away, weight)) = self.followed.mirror(&plan.body.boundary, &at, w, &mut own) {
+                self.followed.follow(Ray::new(at.leave(away), away), flux * (mirrored * weight), own, found);
+            }
+            let passed = plan.body.boundary.passed(w.dot(at.n));
             let arrived = Arrived { plan, at, w, flux: flux * passed };
             self.followed.pass_on(&arrived, draws, found);
         });
@@ -406,7 +407,7 @@ impl Round<'_> {
                 }
                 for ((at, point), sum) in places.iter().zip(&points).zip(&sums) {
                     let w = point.exit.w;
-                    let flux = *sum * (each * transmittance(plan.body.eta, w.dot(at.n)));
+                    let flux = *sum * (each * plan.body.boundary.passed(w.dot(at.n)));
                     self.followed.follow(
                         Ray::new(at.leave(w), w),
                         flux,

@@ -16,7 +16,7 @@ use crate::geometry::{Patches, Solid, SurfacePoint};
 use crate::light::{Lights, emitted};
 use crate::math::{Rgb, Vec3};
 use crate::memory;
-use crate::optics::{Medium, reflect, reflectance, transmittance};
+use crate::optics::{Medium, reflect};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::scene::{Body, EntrySampling, ExitanceBy, Object, Scene, Shape, View};
@@ -62,6 +62,7 @@ impl Subsurface {
         memory::require(needed, memory::available(), &what, "ask for fewer by `method.cache_samples`")?;
         let lights = Lights::new(scene);
         refuse_unmet(scene, &lights, &options)?;
+        refuse_rough(scene, &options)?;
         let walks = |object: u32| options.bounces > 0 && scene.exitance_by(object, options.shape) == ExitanceBy::Walks;
         let plan = |object| Ok(Plan::new(scene, &lights, object, walks(object), options)?.map(Arc::new));
         let plans: Vec<Option<Arc<Plan>>> = objects.map(plan).collect::<Result<_>>()?;
@@ -139,7 +140,7 @@ impl Subsurface {
             let points: Vec<GatherPoint> = group.iter().filter_map(point).collect();
             plan.gather((view, &self.light.lights), (gatherer, Detail::Fine), &points, &mut scratch, tally, &mut sums);
             for ((&(_, i), point), &sum) in group.iter().zip(&points).zip(&sums) {
-                inside[i] = sum * transmittance(plan.body.eta, point.exit.n.dot(point.exit.w));
+                inside[i] = sum * plan.body.boundary.passed(point.exit.n.dot(point.exit.w));
                 if let (Some(single), Some(hit)) = (&self.single, &hits[i]) {
                     inside[i] += single.radiance(view, &rays[i], hit, tally);
                 }
@@ -215,7 +216,7 @@ impl Subsurface {
         }
         let w = -ray.ray.direction;
         let n = at.normal_seen_from(w);
-        inside + self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * reflectance(plan.body.eta, n.dot(w))
+        inside + self.mirrored(view, &at, reflect(w, n), &mut stream, tally) * plan.body.boundary.reflected(n.dot(w))
     }
 
     /// Radiance from the mirrored `direction`: lights, environment, and other surfaces as Lambertian ones.
@@ -246,6 +247,20 @@ fn refuse_unmet(scene: &Scene, lights: &Lights, options: &SubsurfaceOptions) -> 
         let what = "light that enters is looked for by the cosine (`entry = \"cosine\"`, `--as-notes`)";
         Err(Error::scene(format!(
             "{what}, which never meets light {name:?}, for it has no size: take type = \"sun\" or an emissive sphere, or leave that out"
+        )))
+    })
+}
+
+/// Refuses rough boundaries where no path asks for what they reflect.
+fn refuse_rough(scene: &Scene, options: &SubsurfaceOptions) -> Result<()> {
+    let is_rough = |o: &&Object| {
+        let inside = &scene.materials[o.material].surface.inside;
+        options.bounces == 0 && inside.as_ref().is_some_and(|inside| inside.rough.is_some())
+    };
+    scene.objects.iter().find(is_rough).map_or(Ok(()), |object| {
+        Err(Error::scene(format!(
+            "the boundary of `{}` is rough, and `bounces = 0` (as in `--as-notes`) knows smooth ones alone: leave out `roughness` or that",
+            object.name
         )))
     })
 }
@@ -286,7 +301,7 @@ fn modelled(plans: &[Option<Arc<Plan>>], walked: &[bool], options: &SubsurfaceOp
         let clear = walked || lets_light_through(&plan.body.body, plan.medium());
         // What comes over other surfaces is in what the paths bring.
         let near = plan.near.as_ref().filter(|_| !walked).map(|_| plan.clone());
-        Some(Modelled { eta: plan.body.eta, clear, once, near, walked })
+        Some(Modelled { boundary: plan.body.boundary.clone(), clear, once, near, walked })
     };
     plans.iter().zip(walked).map(of).collect()
 }
@@ -313,7 +328,8 @@ fn goes_on(scene: &Scene, modelled: &[Option<Modelled>], options: &SubsurfaceOpt
         let surface = &scene.materials[o.material].surface;
         modelled[*i].is_some() || surface.is_opaque() && !surface.bsdf.albedo().is_black()
     };
-    if scene.has_clear_bodies() {
+    let rough = |m: &Modelled| m.boundary.rough.is_some();
+    if scene.has_clear_bodies() || modelled.iter().flatten().any(rough) {
         return true;
     }
     let mut all = scene.objects.iter().enumerate().filter(reflects);

@@ -133,7 +133,10 @@ impl WalkedBody {
         let bears = |triangle, x| body.union.as_ref().is_none_or(|union| union.bears(triangle, x));
         Self {
             facets: Facets::new(mesh, table.centre(), most, bears),
-            way_out: WayOut::new(body.eta),
+            way_out: match &body.boundary.rough {
+                None => WayOut::new(body.boundary.eta),
+                Some(rough) => WayOut::of_transmittance(0.0, |cosine| rough.passed(cosine)),
+            },
             most: u32::from(!body.model.claims().first_order),
             seed: hash_combine(hash_combine(seed, PURPOSE), body.object().into()),
             plan: plan.clone(),

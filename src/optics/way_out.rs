@@ -39,13 +39,19 @@ pub struct Moments {
 impl WayOut {
     /// Of a boundary of relative index `eta` = n_inside / n_outside > 0.
     pub fn new(eta: f32) -> Self {
-        let rule = GaussLegendre::new(POINTS);
-        // Below this cosine light from outside is totally reflected, and beside it T is a root: c = least + (1 - least) s² puts points there.
+        // Below this cosine light from outside is totally reflected, and beside it T is a root.
         let least = (1.0 - f64::from(eta) * f64::from(eta)).max(0.0).sqrt();
+        Self::of_transmittance(least, |c| transmittance(eta, c))
+    }
+
+    /// Of a boundary that lets the share `passed` of light through along a direction outside, by its cosine; none below the cosine `least`.
+    pub fn of_transmittance(least: f64, passed: impl Fn(f32) -> f32) -> Self {
+        let rule = GaussLegendre::new(POINTS);
+        // c = least + (1 - least) s² puts points beside the root.
         let integral = |power: i32| {
             rule.integrate_panels(0.0, 1.0, PANELS, |s| {
                 let c = least + (1.0 - least) * s * s;
-                2.0 * s * (1.0 - least) * f64::from(transmittance(eta, c as f32)) * c.powi(1 + power)
+                2.0 * s * (1.0 - least) * f64::from(passed(c as f32)) * c.powi(1 + power)
             })
         };
         let [whole, first, second] = [0, 1, 2].map(integral);

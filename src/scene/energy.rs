@@ -237,6 +237,7 @@ mod tests {
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
+            rough: None,
             source: String::new(),
         };
         let (thick, thin) = (cuboid([50.0, 20.0, 50.0]), cuboid([50.0, 0.2, 50.0]));
@@ -265,6 +266,7 @@ mod tests {
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
+            rough: None,
             source: String::new(),
         };
         let said = |model, eta| super::of(&of(model, 0.01, eta), (shape(&thick), false), &|| None).join("\n");

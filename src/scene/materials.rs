@@ -7,6 +7,8 @@ use crate::bssrdf::ModelName;
 use crate::error::Result;
 use crate::math::Rgb;
 use crate::optics::{Look, Medium, Preset};
+use crate::surface::{Bsdf as _, RoughBoundary};
+use std::sync::Arc;
 
 /// One material, its coefficients already per scene unit.
 #[derive(Clone, Debug)]
@@ -99,6 +101,7 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
         "thickness",
         "calibrated",
         "exit_normalisation",
+        "roughness",
     ];
     m.only("a translucent material", &keys)?;
     let scale = m.get("scale", "a number above 0", |n| n.number().filter(|v| *v > 0.0))?.unwrap_or(1.0);
@@ -116,8 +119,15 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
     }
     let medium = medium.checked().map_err(|e| m.error(format!("{e}; see `per` and `scale`")))?;
     let positive = |n: &Node| n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0);
+    let roughness = m.get("roughness", "a number from 0 to 1", |n| n.number().filter(|v| (0.0..=1.0).contains(v)))?;
+    let rough = roughness.and_then(|roughness| RoughBoundary::new(medium.eta, roughness as f32));
+    let source = match &rough {
+        Some(rough) => format!("{source}, {}", rough.text()),
+        None => source,
+    };
     let translucent = Translucent {
         medium,
+        rough: rough.map(Arc::new),
         model: named_value(m, "model")?.unwrap_or(ModelName::AUTO),
         thickness: m.get("thickness", "a number of units above 0", positive)?.map(|v| v as f32),
         calibrated: switch(m, "calibrated")?.unwrap_or(false),

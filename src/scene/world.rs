@@ -1,12 +1,12 @@
 //! The checked world: everything in scene units, relative to the scene's centre.
 
 use super::{Body, Camera, Environment, Insides, LightSource, ObstacleKind};
-use crate::bssrdf::{Bssrdf, ModelName, ModelOption, ModelOptions, choose};
+use crate::bssrdf::{Bssrdf, ModelName, ModelOption, ModelOptions, choose_behind};
 use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
-use crate::surface::{Boundary, Bsdf, Lambertian, Texture, Textured};
+use crate::surface::{Boundary, Bsdf, Lambertian, RoughBoundary, Texture, Textured};
 use std::sync::Arc;
 
 /// A scene whose numbers have been checked.
@@ -121,9 +121,12 @@ impl Surface {
         Self { bsdf: Arc::new(Lambertian::BLACK), emission: Some(emission), inside: None, clear: None }
     }
 
-    /// A scattering medium behind a smooth boundary.
+    /// A scattering medium behind its boundary.
     pub fn translucent(inside: Translucent) -> Self {
-        let bsdf = Arc::new(Boundary { eta: inside.medium.eta });
+        let bsdf: Arc<dyn Bsdf> = match &inside.rough {
+            Some(rough) => rough.clone(),
+            None => Arc::new(Boundary { eta: inside.medium.eta }),
+        };
         Self { bsdf, emission: None, inside: Some(inside), clear: None }
     }
 
@@ -177,6 +180,8 @@ pub struct Translucent {
     pub calibrated: bool,
     /// Divide S_d by 4 C_phi(1/eta), so that the exit Fresnel factor loses no energy.
     pub exit_normalisation: bool,
+    /// Its boundary, if that is not smooth.
+    pub rough: Option<Arc<RoughBoundary>>,
     /// Where the numbers come from, for logs and headers.
     pub source: String,
 }
@@ -240,14 +245,15 @@ impl Translucent {
     /// What the model is made with.
     pub fn options(&self) -> ModelOptions {
         let &Self { exit_normalisation, thickness, calibrated, .. } = self;
-        ModelOptions { exit_normalisation, thickness, calibrated, ..ModelOptions::DEFAULT }
+        let boundary = self.rough.as_ref().map(|rough| rough.moments());
+        ModelOptions { exit_normalisation, thickness, calibrated, boundary, ..ModelOptions::DEFAULT }
     }
 
     /// The model as logs and file headers name it: with its variant, and for `auto` the choice and the reason.
     pub fn model_text(&self) -> String {
         let name = self.model.name();
         match self.thickness {
-            _ if self.model == ModelName::AUTO => choose(&self.medium, self.thickness).to_string(),
+            _ if self.model == ModelName::AUTO => choose_behind(&self.medium, &self.options()).to_string(),
             _ if self.calibrated && self.model.takes(ModelOption::Calibrated) => format!("{name} (calibrated)"),
             Some(thickness) if self.model.takes(ModelOption::Thickness) => format!("{name} ({thickness} unit thick)"),
             _ => name.into(),

@@ -86,6 +86,7 @@ impl Body {
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
+            rough: None,
             source: String::new(),
         };
         let objects = vec![Object {

@@ -16,7 +16,7 @@ use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::scene::{Orders, Surface};
-use crate::surface::Bsdf;
+use crate::surface::{Bsdf, RoughBoundary};
 use crate::tally::{Cause, Tally, WalkTally};
 
 /// A path that a surface with a mirror has left this weight goes on for certain.
@@ -180,13 +180,11 @@ impl<'a> CameraPath<'a> {
                 if entry.body.matched {
                     return self.inside(entry, &at, direction);
                 }
-                let w = self
-                    .view
-                    .scene
-                    .surface(entry.body.object)
-                    .bsdf
-                    .sample(&at, -direction, [self.draws.number(), 0.0, 0.0])?
-                    .wi;
+                let flat = SurfacePoint { n: at.n_geometric, ..at };
+                if entry.body.rough.is_some() {
+                    return self.meet_rough(entry, (&flat, -direction), true);
+                }
+                let w = entry.body.cross(&flat, -direction, &mut self.draws)?.wi;
                 if w.dot(at.n_geometric) < 0.0 { self.inside(entry, &at, w) } else { Some(Ray::new(at.leave(w), w)) }
             }
         }
@@ -239,6 +237,28 @@ impl<'a> CameraPath<'a> {
         (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
     }
 
+    /// Asks for lights at a rough boundary that is met from outside, unless `mirrors` is false, and goes on by its sampling: away, or through the body.
+    pub fn meet_rough(&mut self, entry: Entry<'a>, (at, wo): (&SurfacePoint, Vec3), mirrors: bool) -> Option<Ray> {
+        if let Some(rough) = entry.body.rough.as_ref().filter(|_| mirrors) {
+            let weight = self.spectrum.value_outside();
+            self.ask_on((at, wo, &**rough), &Stack::default(), weight, |path| &mut path.draws);
+        }
+        let next = entry.body.cross(at, wo, &mut self.draws)?;
+        self.spectrum.scale(next.weight);
+        // By the interpolated normal light may go where it cannot by the triangle's.
+        match [at.n, at.n_geometric].map(|n| n.dot(next.wi) > 0.0) {
+            [true, true] if mirrors => {
+                self.turn(Some((next.pdf, Reference::surface(at))));
+                Some(Ray::new(at.leave(next.wi), next.wi))
+            }
+            [false, false] => {
+                self.turn(None);
+                self.inside(entry, at, next.wi)
+            }
+            _ => None,
+        }
+    }
+
     /// Through bodies from `at`, refracted into `w`; the ray on which the path leaves them.
     pub fn inside(&mut self, entry: Entry<'a>, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
         let from = SurfacePoint { error: at.error.max(entry.margin), ..*at }.leave(w);
@@ -264,7 +284,8 @@ impl<'a> CameraPath<'a> {
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let (body, exit) = left?;
-        if !body.matched {
+        // Behind a rough boundary lights have been asked for.
+        if !body.matched && body.rough.is_none() {
             self.turn(None);
             self.left = Some((body, exit.straight));
         }
@@ -368,6 +389,11 @@ impl WalkObserver for Gather<'_, '_> {
         }
     }
 
+    fn boundary(&mut self, at: &SurfacePoint, wo: Vec3, rough: &RoughBoundary, spectrum: &Spectrum) {
+        let (path, body) = (&mut *self.path, self.body);
+        path.ask_on((at, wo, rough), &Stack::default(), spectrum.value(&body.medium), |path| &mut path.coins);
+    }
+
     fn turned(&mut self, turn: Turn<'_>) {
         let (path, asks) = (&mut *self.path, self.body.matched);
         match turn {
@@ -375,6 +401,7 @@ impl WalkObserver for Gather<'_, '_> {
             Turn::Scattered(x, pdf) => path.turn(asks.then(|| (pdf, Reference::place(x)))),
             // Of a mirror nothing was asked.
             Turn::Reflected(at, pdf) => path.turn((asks && pdf > 0.0).then(|| (pdf, Reference::surface(at)))),
+            Turn::Out(at, pdf) => path.turn(Some((pdf, Reference::surface(at)))),
             Turn::Bent => path.turn(None),
         }
     }
@@ -405,6 +432,14 @@ impl Orders {
 pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
     let Some(entry) = path.entry(hit, direction) else { return };
     let body = entry.body;
+    if body.rough.is_some() {
+        let at = path.view.point(hit, direction);
+        let mirrors = path.method.options.specular;
+        if let Some(ray) = path.meet_rough(entry, (&at, -direction), mirrors) {
+            path.trace(ray);
+        }
+        return;
+    }
     let (spectrum, draws) = (path.spectrum, path.draws.clone());
     if path.method.options.specular && !body.matched {
         let at = path.view.point(hit, direction);
@@ -428,6 +463,9 @@ pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, directi
     let at = path.view.point(hit, direction);
     if body.matched {
         return path.inside(entry, &at, direction);
+    }
+    if body.rough.is_some() {
+        return path.meet_rough(entry, (&at, -direction), false);
     }
     let n = shading_normal(body, &at, direction);
     let passed = transmittance(body.eta, -n.dot(direction));

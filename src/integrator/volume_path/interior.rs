@@ -10,7 +10,7 @@ use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium};
 use crate::query::{Hit, Ray};
 use crate::scene::{Contacts, Surface};
-use crate::surface::{Boundary, Bsdf};
+use crate::surface::{Boundary, Bsdf, BsdfSample, RoughBoundary};
 use crate::tally::{Cause, WalkTally};
 use std::sync::Arc;
 
@@ -21,6 +21,8 @@ pub struct Interior {
     pub object: u32,
     /// n_inside / n_outside.
     pub eta: f32,
+    /// Its boundary, if that is not smooth.
+    pub rough: Option<Arc<RoughBoundary>>,
     /// The medium.
     pub medium: Coefficients,
     /// Where collisions send light.
@@ -90,6 +92,9 @@ pub trait WalkObserver {
     /// The path has come to an opaque surface inside the body, which faces it, and goes back along `_wo`.
     fn surface(&mut self, _at: &SurfacePoint, _wo: Vec3, _bsdf: &dyn Bsdf, _spectrum: &Spectrum) {}
 
+    /// The path has come to the body's own rough boundary at `_at`, its normals outwards, and goes back along `_wo`.
+    fn boundary(&mut self, _at: &SurfacePoint, _wo: Vec3, _rough: &RoughBoundary, _spectrum: &Spectrum) {}
+
     /// How the path goes on.
     fn turned(&mut self, _turn: Turn<'_>) {}
 }
@@ -103,6 +108,8 @@ pub enum Turn<'a> {
     Scattered(DVec3, f32),
     /// Reflected by an opaque surface, which faces it, into a direction of this density [1/sr]; 0 by a mirror.
     Reflected(&'a SurfacePoint, f32),
+    /// Come out of a rough boundary here, whose normals are outwards, in a direction of this density [1/sr].
+    Out(&'a SurfacePoint, f32),
     /// Refracted or mirrored.
     Bent,
 }
@@ -168,6 +175,7 @@ impl Interior {
         Self {
             object,
             eta: medium.eta,
+            rough: None,
             patience: (0.1 / absorbed.max(1e-3)).clamp(1.0, 64.0) as u32,
             least_extinction: if least.is_finite() { least } else { 0.0 },
             medium: coefficients,
@@ -195,6 +203,22 @@ impl Interior {
             }
             ray.t_min = hit.t;
         }
+    }
+
+    /// A point of the boundary as light from inside meets it: by the triangle alone where it is rough.
+    #[inline]
+    pub fn flat(&self, at: SurfacePoint) -> SurfacePoint {
+        if self.rough.is_some() { SurfacePoint { n: at.n_geometric, ..at } } else { at }
+    }
+
+    /// Which way light goes on that goes to `wo` from a point of the boundary, from either side.
+    #[inline]
+    pub fn cross(&self, at: &SurfacePoint, wo: Vec3, draws: &mut PathSampler) -> Option<BsdfSample> {
+        let Some(rough) = &self.rough else {
+            return Boundary { eta: self.eta }.sample(at, wo, [draws.number(), 0.0, 0.0]);
+        };
+        let [u, v] = draws.pair();
+        rough.sample(at, wo, [u, v, draws.number()])
     }
 
     /// Extinction [1/unit].
@@ -347,10 +371,19 @@ impl Interior {
                         spectrum.leave(&self.medium);
                         return Some(WalkExit { at, w, straight: None });
                     }
-                    let next = Boundary { eta: self.eta }.sample(&at, -w, [draws.number(), 0.0, 0.0])?.wi;
+                    let at = self.flat(at);
+                    if let Some(rough) = &self.rough {
+                        watch.boundary(&at, -w, rough, spectrum);
+                    }
+                    let BsdfSample { wi: next, weight, pdf } = self.cross(&at, -w, draws)?;
+                    spectrum.scale(weight);
                     let cosines = [w.dot(at.n_geometric), next.dot(at.n_geometric)];
                     if cosines[1] > 0.0 {
                         spectrum.leave(&self.medium);
+                        if self.rough.is_some() {
+                            watch.turned(Turn::Out(&at, pdf));
+                            return Some(WalkExit { at, w: next, straight: None });
+                        }
                         let straight = edge.map(|phase| Straight { from, phase, length: t, cosines });
                         return Some(WalkExit { at, w: next, straight });
                     }

@@ -133,6 +133,14 @@ impl VolumePath {
         if !refusals.is_empty() {
             return Err(Error::scene(refusals.join("\n")));
         }
+        let rough = |i: usize| scene.surface(i as u32).inside.as_ref().is_some_and(|inside| inside.rough.is_some());
+        if let Some(i) = (0..scene.objects.len()).find(|&i| rough(i) && scene.nests().meets[i]) {
+            return Err(Error::scene(format!(
+                "the boundary of `{}` is rough and meets another body: `volume_path` knows rough boundaries of bodies that stand alone; move \
+                 them apart, or take `roughness = 0`",
+                scene.objects[i].name
+            )));
+        }
         let lights = Lights::new(scene);
         let bodies: Vec<Option<Interior>> =
             (0..scene.objects.len()).map(|i| interior(scene, i, CLEARANCE_CELLS).map(matched)).collect();
@@ -141,7 +149,7 @@ impl VolumePath {
         let source = |body: &Option<Interior>| {
             let body = body.as_ref().filter(|_| multiple && options.photons > 0 && shines)?;
             let reach = REACH / body.medium.sigma_t.mean();
-            let alone = body.medium.albedo.max() > 0.0 && !body.nested && !body.matched;
+            let alone = body.medium.albedo.max() > 0.0 && !body.nested && !body.matched && body.rough.is_none();
             let world = scene.body(body.object).filter(|_| alone)?;
             Some(Source::new(world, options.photons, reach, options.seed))
         };
@@ -185,8 +193,10 @@ impl VolumePath {
     /// What to say of `scene` before it is rendered: light that may not be found.
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         // Behind a stand-in is nothing.
-        let matched = |object: usize| self.bodies[object].as_ref().is_some_and(|body| body.matched);
-        let passes = |object: usize| self.stand_ins[object].is_none() && !matched(object);
+        // Lights are asked for there.
+        let asks = |body: &Interior| body.matched || body.rough.is_some();
+        let asked = |object: usize| self.bodies[object].as_ref().is_some_and(asks);
+        let passes = |object: usize| self.stand_ins[object].is_none() && !asked(object);
         let lights = &self.light.lights;
         [clear::warning(scene, lights, passes), clear::never_met(scene, lights, passes)].into_iter().flatten().collect()
     }
@@ -348,7 +358,8 @@ fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
     });
     let leak = leak.unwrap_or(Cause::Rounding);
     let (nests, contacts) = (scene.nests(), scene.nests().contacts[index].clone());
-    Some(Interior { leak, nested: clear.is_some() || nests.meets[index], contacts, ..interior })
+    let rough = scene.surface(body.object).inside.as_ref().and_then(|inside| inside.rough.clone());
+    Some(Interior { leak, rough, nested: clear.is_some() || nests.meets[index], contacts, ..interior })
 }
 
 /// With lines through its boundary where that does not refract.
@@ -371,7 +382,8 @@ fn endless(scene: &Scene, cells: u32, wanted: impl Fn(usize) -> bool) -> Vec<Opt
 /// How lamps and suns are asked for in each of the bodies that scatter.
 fn throughs(scene: &Scene, lights: &Lights, bodies: &[Option<Interior>]) -> Vec<Option<RefractedNee>> {
     let of = |body: &Option<Interior>| {
-        let body = body.as_ref().filter(|body| body.medium.albedo.max() > 0.0 && !body.matched)?;
+        let body =
+            body.as_ref().filter(|body| body.medium.albedo.max() > 0.0 && !body.matched && body.rough.is_none())?;
         RefractedNee::new(scene, lights, body.object, body.eta, body.phase.g as f32)
     };
     bodies.iter().map(of).collect()
@@ -441,6 +453,10 @@ impl Integrator for VolumePath {
                 }
                 None if body.as_ref().is_some_and(|b| b.matched) => {
                     let why = "it does not refract: lights are asked for over straight lines through its boundary";
+                    Part::left_out(format!("photons in `{name}`"), why)
+                }
+                None if body.as_ref().is_some_and(|b| b.rough.is_some()) => {
+                    let why = "its boundary is rough: lights are asked for where paths come to it";
                     Part::left_out(format!("photons in `{name}`"), why)
                 }
                 None if body.as_ref().is_some_and(|b| b.nested) => {

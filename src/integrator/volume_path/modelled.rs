@@ -6,19 +6,20 @@ use super::draws::PathSampler;
 use super::glass;
 use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
 use super::jumps::{Balls, Jumps};
-use super::nesting::Entry;
+use super::nesting::{Entry, Stack};
 use super::spectrum::Spectrum;
 use super::{Asked, CLEARANCE_CELLS, VolumePath, VolumePathOptions, endless, throughs};
 use crate::bssrdf::Exit;
 use crate::cache::{Plan, Step};
 use crate::geometry::SurfacePoint;
 use crate::integrator::{CameraRay, View};
+use crate::light::Reference;
 use crate::math::{DVec3, Rgb, Vec3, hash_combine};
-use crate::optics::{Medium, reflect, reflectance, refract, transmittance};
+use crate::optics::{Medium, reflect};
 use crate::query::{Hit, Ray};
 use crate::sampling::{PixelStream, cosine_hemisphere};
 use crate::scene::{Orders, Scene};
-use crate::surface::{Boundary, Bsdf, Lambertian};
+use crate::surface::{Bsdf as _, Interface, Lambertian, RoughReflection};
 use crate::tally::Tally;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -26,8 +27,8 @@ use std::sync::Arc;
 /// How paths meet a body whose light a model has.
 #[derive(Clone)]
 pub struct Modelled {
-    /// n_inside / n_outside.
-    pub eta: f32,
+    /// Its boundary.
+    pub boundary: Interface,
     /// Whether light comes through unscattered, which is no part of any model.
     pub clear: bool,
     /// Whether light scattered once is no part of the model.
@@ -193,15 +194,16 @@ impl CameraPath<'_> {
         let Some(model) = &self.method.modelled[hit.mesh as usize] else { return };
         let at = self.view.point(hit, direction);
         let n = at.normal_seen_from(-direction);
-        let passed = transmittance(model.eta, -n.dot(direction));
+        let passed = model.boundary.passed(-n.dot(direction));
         let (object, w, stream) = (hit.mesh, -direction, self.stream);
         self.scratch.asked.push(Asked { object, at, w, weight: Rgb::splat(passed), stream, later: false });
         let (spectrum, draws) = (self.spectrum, self.draws.clone());
         if self.method.options.specular {
-            self.spectrum.scale(Rgb::splat(reflectance(model.eta, -n.dot(direction))));
-            let w = reflect(-direction, n);
             self.draws = draws.fork(1);
-            self.trace(Ray::new(at.leave(w), w));
+            let share = model.boundary.reflected(n.dot(w));
+            if let Some(ray) = self.mirrored(&model.boundary, &SurfacePoint { n, ..at }, w, share) {
+                self.trace(ray);
+            }
         }
         if let Some(plan) = &model.near {
             (self.spectrum, self.draws, self.sight) = (spectrum, draws.fork(2), None);
@@ -215,7 +217,8 @@ impl CameraPath<'_> {
         if model.clear {
             (self.spectrum, self.draws, self.sight) = (spectrum, draws.fork(3), None);
             self.spectrum.scale(Rgb::splat(passed));
-            if let Some(ray) = refract(w, n, body.eta).and_then(|inside| self.straight(body, &at, inside)) {
+            let inside = self.enters(&model.boundary, n, w);
+            if let Some(ray) = inside.and_then(|inside| self.straight(body, &at, inside)) {
                 self.trace(ray);
             }
         }
@@ -239,21 +242,22 @@ impl CameraPath<'_> {
             self.ask(hit, at, w);
             return None;
         }
-        let mirrored = reflectance(model.eta, n.dot(w));
-        let away = reflect(w, n);
+        let mirrored = model.boundary.reflected(n.dot(w));
+        let flat = SurfacePoint { n, ..*at };
         let weight = self.spectrum.value_outside().max();
         if weight * mirrored >= BRANCHING && self.branches < MOST_BRANCHES {
             let (spectrum, draws) = (self.spectrum, self.draws.clone());
             self.branches += 1;
-            self.spectrum.scale(Rgb::splat(mirrored));
             self.draws = draws.fork(1);
-            self.trace(Ray::new(at.leave(away), away));
+            if let Some(ray) = self.mirrored(&model.boundary, &flat, w, mirrored) {
+                self.trace(ray);
+            }
             (self.spectrum, self.draws, self.sight, self.left) = (spectrum, draws.fork(2), None, None);
             self.stepped = false;
             self.branches -= 1;
             self.spectrum.scale(Rgb::splat(1.0 - mirrored));
         } else if self.draws.number() < mirrored {
-            return Some(Ray::new(at.leave(away), away));
+            return self.mirrored(&model.boundary, &flat, w, 1.0);
         }
         self.ask(hit, at, w);
         let body = self.method.body(hit.mesh);
@@ -263,7 +267,8 @@ impl CameraPath<'_> {
         let picked = (self.draws.number() * count) as usize;
         let (kind, _) = there.into_iter().enumerate().filter(|(_, there)| *there).nth(picked)?;
         self.spectrum.scale(Rgb::splat(count));
-        match (kind, body, refract(w, n, model.eta)) {
+        let inside = if kind > 0 { self.enters(&model.boundary, n, w) } else { None };
+        match (kind, body, inside) {
             (0, ..) => self.step(step?, at, w),
             (1, Some(body), Some(inside)) => self.straight(body, at, inside),
             (_, Some(body), Some(inside)) => {
@@ -272,6 +277,33 @@ impl CameraPath<'_> {
             }
             _ => None,
         }
+    }
+
+    /// The ray along which light comes that the boundary reflects to `w`, weighted by `share` in the mean; at a rough one lights are asked for.
+    fn mirrored(&mut self, boundary: &Interface, at: &SurfacePoint, w: Vec3, share: f32) -> Option<Ray> {
+        let Some(rough) = &boundary.rough else {
+            self.spectrum.scale(Rgb::splat(share));
+            let away = reflect(w, at.n);
+            return Some(Ray::new(at.leave(away), away));
+        };
+        let bsdf = RoughReflection(rough);
+        self.spectrum.scale(Rgb::splat(share / boundary.reflected(at.n.dot(w))));
+        let weight = self.spectrum.value_outside();
+        self.ask_on((at, w, &bsdf), &Stack::default(), weight, |path| &mut path.draws);
+        let [u, v] = self.draws.pair();
+        let next = bsdf.sample(at, w, [u, v, self.draws.number()])?;
+        self.spectrum.scale(next.weight);
+        self.turn(Some((next.pdf, Reference::surface(at))));
+        (at.n_geometric.dot(next.wi) > 0.0).then(|| Ray::new(at.leave(next.wi), next.wi))
+    }
+
+    /// A direction inside of light that gets in from `w`, weighted by a mean of 1.
+    fn enters(&mut self, boundary: &Interface, n: Vec3, w: Vec3) -> Option<Vec3> {
+        let smooth = boundary.rough.is_none();
+        let u = if smooth { [0.0; 3] } else { [self.draws.number(), self.draws.number(), self.draws.number()] };
+        let (inside, weight) = boundary.enter(n, w, u)?;
+        self.spectrum.scale(Rgb::splat(weight));
+        Some(inside)
     }
 
     /// Asks the model of the body at `hit`. A sum over a cache costs as much as many rays: of paths of little weight some ask, with more.
@@ -301,7 +333,9 @@ impl CameraPath<'_> {
             if left <= 0.0 || !russian_roulette(left / before / FAINT, &mut self.spectrum, &mut self.draws) {
                 return None;
             }
-            let next = Boundary { eta: body.eta }.sample(&at, -w, [self.draws.number(), 0.0, 0.0])?.wi;
+            let next = body.cross(&body.flat(at), -w, &mut self.draws)?;
+            self.spectrum.scale(next.weight);
+            let next = next.wi;
             from = at.leave(next);
             if next.dot(at.n_geometric) > 0.0 {
                 return Some(Ray::new(from, next));
