@@ -96,7 +96,7 @@ fn walks_and_the_path_tracer_agree_behind_a_rough_boundary() {
             &(camera([0.0, 2.0, 6.0], [0.0; 3], 20.0, [12, 12])
                 + &sphere("ball", [0.0; 3], 1.0, 16, "rough")
                 + &rectangle("lamp", [0.0, 3.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "lamp")
-                + &rough("sigma_s = [2, 4, 8]\nsigma_a = [0.02, 0.05, 0.2]\ng = 0\neta = 1.4", roughness)
+                + &rough("sigma_s = [2, 4, 8]\nsigma_a = [0.2, 0.4, 0.8]\ng = 0\neta = 1.4", roughness)
                 + &emissive("lamp", 10)),
         )
     };

@@ -48,6 +48,11 @@ def medium(sigma_s, sigma_a, g=0.0, eta=1.4):
     return {"kind": "medium", "sigma_s": rgb(sigma_s), "sigma_a": rgb(sigma_a), "g": g, "eta": eta}
 
 
+def ground(body, roughness=0.15):
+    """The same behind a boundary so slightly rough that what Mitsuba loses, light thrown from facet to facet, is below the noise."""
+    return body | {"roughness": roughness}
+
+
 def clear(eta, sigma_a=0.0):
     return {"kind": "clear", "sigma_a": rgb(sigma_a), "eta": eta}
 
@@ -161,6 +166,11 @@ def bodies():
     add("milk_forward", "milk of g = 0.8, area lamp", "volume_path", [floor(), (CUBE, MILK_FORWARD), ceiling_lamp(3, 2)])
     add("milk_room", "milk in a closed room", "volume_path", room() + [(BALL, MILK), ceiling_lamp(3, 2, 4.9)])
     add("milk_small", "milk, lamp of 0.6 mm", "volume_path", [floor(0.0), (CUBE, MILK), ceiling_lamp(60, 0.3, 2.6, 0.5, 1.5)])
+    add("ground_sky", "milk behind a rough boundary, even sky", "volume_path", [floor(), (BALL, ground(MILK))], 1.0)
+    add("ground_area", "milk behind a rough boundary, area lamp behind", "volume_path", [floor(), (BALL, ground(MILK)), back_lamp()])
+    add("ground_image", "marble torus behind a rough boundary, picture", "volume_path", [floor(), (torus((0, 1.2, 0), 0.9, 0.4), ground(MARBLE))], SOFT)
+    add("ground_below_1", "rough boundary, eta 0.75, picture", "volume_path", [floor(), (BALL, ground(medium(2, (0.02, 0.1, 0.3), 0.4, 0.75)))], SOFT)
+    add("ground_lights", "absorbing cube of eta 1.6 behind a rough boundary, point and distant light", "volume_path", [floor(0.1), (CUBE, ground(medium(1, (1, 2, 4), 0, 1.6), 0.2))], lights=[POINT, DISTANT])
     add("marble_area", "marble, area lamp behind", "volume_path", [floor(), (BALL, MARBLE), back_lamp()])
     add("marble_image", "marble torus, picture", "volume_path", [floor(), (torus((0, 1.2, 0), 0.9, 0.4), MARBLE)], SOFT)
     add("marble_sun", "marble cube, picture with a sun", "volume_path", [floor(), (CUBE, MARBLE)], SUN)

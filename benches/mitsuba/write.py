@@ -205,7 +205,9 @@ def mitsuba_scene(scene, folder, size, setting="mitsuba", integrator=None):
             out[f"object{i}"] = dict(shape, **opaque(inside, folder))
             continue
         eta, outside = objects[inside][1]["eta"], 1.0 if around is None else objects[around][1]["eta"]
-        shape["bsdf"] = {"type": "null"} if eta == outside else {"type": "dielectric", "int_ior": eta, "ext_ior": outside}
+        rough = {"type": "roughdielectric", "distribution": "ggx", "alpha": objects[inside][1].get("roughness", 0.0) ** 2}
+        boundary = rough if rough["alpha"] else {"type": "dielectric"}
+        shape["bsdf"] = {"type": "null"} if eta == outside else boundary | {"int_ior": eta, "ext_ior": outside}
         for side, body in (("interior", inside), ("exterior", around)):
             if body in medium_ref:
                 shape[side] = {"type": "ref", "id": medium_ref[body]}
