@@ -59,6 +59,24 @@ fn rough_bodies_that_absorb_nothing_cannot_be_seen() {
     }
 }
 
+/// A thin body by a model that lacks light scattered once: what comes straight through, or is scattered once, is counted once, whether a lamp brings it, for which the
+/// boundary asks, or a sky, for which it does not.
+#[test]
+fn thin_rough_bodies_have_the_same_light_from_a_lamp_and_a_sky() {
+    let lamp =
+        sphere("lamp", [0.0; 3], 9.0, 12, "lamp").replace("material", "flip = true\nmaterial") + &emissive("lamp", 1);
+    let [by_lamp, by_sky] = [lamp, sky(1)].map(|around| {
+        let text =
+            camera([0.0, 2.0, 6.0], [0.0; 3], 16.0, [8, 8]) + &around + &sphere("ball", [0.0; 3], 1.0, 24, "rough");
+        let medium =
+            rough("model = \"better\"\nsigma_s = [0.3, 0.6, 0.9]\nsigma_a = [0.3, 0.2, 0.1]\ng = 0\neta = 1.4", 0.6);
+        means(&load(&(text + &medium)), Some((Shape::HalfSpace, 500)), 64, 6)
+    });
+    for c in 0..3 {
+        agree(by_lamp[c], by_sky[c], Within { errors: 4.0, noise: 0.02 }, "thin");
+    }
+}
+
 /// Of a body that is black inside only what the boundary reflects is seen: ∫ f cosθ L dω over points of a lamp.
 #[test]
 fn lamps_are_reflected_by_the_formula() {

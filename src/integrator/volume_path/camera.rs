@@ -391,6 +391,10 @@ impl WalkObserver for Gather<'_, '_> {
 
     fn boundary(&mut self, at: &SurfacePoint, wo: Vec3, rough: &RoughBoundary, spectrum: &Spectrum) {
         let (path, body) = (&mut *self.path, self.body);
+        // Beside a model what comes straight through has paths of its own.
+        if path.order == 0 && path.method.modelled[body.object as usize].is_some() {
+            return;
+        }
         path.ask_on((at, wo, rough), &Stack::default(), spectrum.value(&body.medium), |path| &mut path.coins);
     }
 

@@ -333,14 +333,21 @@ impl CameraPath<'_> {
             if left <= 0.0 || !russian_roulette(left / before / FAINT, &mut self.spectrum, &mut self.draws) {
                 return None;
             }
-            let next = body.cross(&body.flat(at), -w, &mut self.draws)?;
-            self.spectrum.scale(next.weight);
-            let next = next.wi;
-            from = at.leave(next);
-            if next.dot(at.n_geometric) > 0.0 {
-                return Some(Ray::new(from, next));
+            let at = body.flat(at);
+            if let Some(rough) = &body.rough {
+                let weight = self.spectrum.value_outside();
+                self.ask_on((&at, -w, &**rough), &Stack::default(), weight, |path| &mut path.draws);
             }
-            w = next;
+            let next = body.cross(&at, -w, &mut self.draws)?;
+            self.spectrum.scale(next.weight);
+            from = at.leave(next.wi);
+            if next.wi.dot(at.n_geometric) > 0.0 {
+                if body.rough.is_some() {
+                    self.turn(Some((next.pdf, Reference::surface(&at))));
+                }
+                return Some(Ray::new(from, next.wi));
+            }
+            w = next.wi;
         }
         None
     }
