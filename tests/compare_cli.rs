@@ -18,7 +18,7 @@ fn models_are_held_against_a_truth() {
         "--truth",
         "beam",
         "--time-budget",
-        "150ms",
+        "400ms",
         "-o",
         "out",
     ];

@@ -26,7 +26,7 @@ fn means(scene: &Scene, shape: Option<(Shape, u32)>, passes: u32, runs: u64) -> 
                 film(&method, scene, passes, seed, &mut [])
             }
             Some((shape, samples)) => {
-                let options = SubsurfaceOptions { shape, ..options(Estimator::Cut, samples, seed) };
+                let options = SubsurfaceOptions { shape, single: true, ..options(Estimator::Cut, samples, seed) };
                 film(&subsurface(scene, options), scene, passes, seed, &mut [])
             }
         };
@@ -114,14 +114,14 @@ fn walks_and_the_path_tracer_agree_behind_a_rough_boundary() {
             &(camera([0.0, 2.0, 6.0], [0.0; 3], 20.0, [12, 12])
                 + &sphere("ball", [0.0; 3], 1.0, 16, "rough")
                 + &rectangle("lamp", [0.0, 3.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], "lamp")
-                + &rough("sigma_s = [2, 4, 8]\nsigma_a = [0.2, 0.4, 0.8]\ng = 0\neta = 1.4", roughness)
+                + &rough("sigma_s = [2, 4, 8]\nsigma_a = [0.02, 0.05, 0.2]\ng = 0\neta = 1.4", roughness)
                 + &emissive("lamp", 10)),
         )
     };
     let [polished, nearly] = [0.0, 0.1].map(|roughness| means(&scene(roughness), None, 512, 8));
     let matt = scene(0.6);
     let by_paths = means(&matt, None, 512, 6);
-    let by_walks = means(&matt, Some((Shape::Walked, 2000)), 4, 4);
+    let by_walks = means(&matt, Some((Shape::Walked, 2000)), 6, 6);
     for c in 0..3 {
         agree(nearly[c], polished[c], Within { errors: 5.0, noise: 0.015 }, "nearly smooth");
         // Blocks of the default are within 2 to 4 % of the truth, means within 1.3 (docs/shape.md).

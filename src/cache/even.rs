@@ -6,6 +6,7 @@ use super::{Balance, Cache, CachedSample, Detail, GatherPoint, Gatherer, Plan, S
 use crate::bssrdf::{Exit, ModelName, ModelOptions, Partition};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3, Vec4};
+use crate::optics::Medium;
 use crate::sampling::{CacheStream, PixelStream, Points, cosine_hemisphere};
 use crate::scene::{Estimator, View};
 use crate::tally::Tally;
@@ -14,8 +15,9 @@ use std::f64::consts::PI;
 
 /// Samples of even light.
 const SAMPLES: u32 = 1 << 14;
-/// Points where what they bring is gathered.
-const POINTS: u32 = 1 << 12;
+/// Points where what they bring is gathered, within bounds: so many for a square of a transport mean free path, which is how fine the balance is.
+const POINTS: [u32; 2] = [1 << 9, 1 << 13];
+const PER_SQUARE: f64 = 4.0;
 /// The largest share of the sum that one node of a cut may be wrong by. On a ball of some mean free paths the balance is then known to 0.3 %,
 /// which more samples do not better.
 const ERROR: f32 = 0.05;
@@ -38,8 +40,8 @@ const SEED: u64 = 0x6261_6c61;
 /// The balance of the body of `plan`, through which light may come `clear`: unscattered, beside the model. A function of the scene alone.
 pub fn balance(plan: &Plan, view: View<'_>, clear: bool) -> Option<Balance> {
     let body = &plan.body;
-    let count = if plan.near.is_some() { NEAR[0] } else { POINTS };
     let surface = view.scene.surface(body.object()).inside.as_ref()?;
+    let count = if plan.near.is_some() { NEAR[0] } else { points(body.table().area(), &surface.medium) };
     let normalised = surface.model.normalises_exit(surface.exit_normalisation);
     let options = surface.options();
     let exit = if normalised { options.moments(&surface.medium).four_c_phi_outside } else { 1.0 };
@@ -115,6 +117,13 @@ pub fn balance(plan: &Plan, view: View<'_>, clear: bool) -> Option<Balance> {
         })
         .collect();
     Some(Balance::new(known.into_iter().flatten().collect(), area, body.table().centre()))
+}
+
+/// How many points an area [unit²] of a medium needs.
+fn points(area: f64, medium: &Medium) -> u32 {
+    let least = medium.transport_mean_free_path().0.into_iter().fold(f32::INFINITY, f32::min);
+    let wanted = PER_SQUARE * area / f64::from(least).powi(2);
+    (wanted as u32).clamp(POINTS[0], POINTS[1])
 }
 
 /// The mean of `count` samples of what even light close to `point` brings there.
