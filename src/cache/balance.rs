@@ -30,9 +30,11 @@ pub struct Known {
     pub x: Vec3,
     /// Normal there.
     pub n: Vec3,
-    /// What sums here are divided by: s P + 1 - P, s being what even light brings over what it brings on a plane, or more where that
-    /// would leave too much beside unscattered light.
+    /// What sums here are divided by: s P + 1 - P, s being what even light brings over what it brings on a plane.
     pub divisor: Rgb,
+    /// The least that they are divided by, lest too much leaves beside unscattered light. The larger of the means over neighbours counts: that of each would
+    /// be too large by their noise.
+    pub least: Rgb,
 }
 
 impl Balance {
@@ -48,7 +50,7 @@ impl Balance {
     pub fn at(&self, place: DVec3, n: Vec3) -> Rgb {
         let x = (place - self.centre).as_vec3();
         let [i, j, k] = cell(x, self.radius);
-        let (mut sum, mut weights) = (Rgb::BLACK, 0.0);
+        let (mut sum, mut least, mut weights) = (Rgb::BLACK, Rgb::BLACK, 0.0);
         for d in 0..27 {
             let Some(known) = self.cells.get(&[i + d % 3 - 1, j + d / 3 % 3 - 1, k + d / 9 - 1]) else { continue };
             for known in known {
@@ -57,11 +59,13 @@ impl Balance {
                     // A face that looks away is hardly one with this.
                     let weight = near * near * known.n.dot(n).max(0.01);
                     sum += known.divisor * weight;
+                    least += known.least * weight;
                     weights += weight;
                 }
             }
         }
-        if weights > 0.0 { sum.map(|s| weights / s) } else { Rgb::WHITE }
+        let divisor = Rgb::from_fn(|c| sum[c].max(least[c]));
+        if weights > 0.0 { divisor.map(|s| weights / s) } else { Rgb::WHITE }
     }
 }
 

@@ -96,22 +96,23 @@ pub fn balance(plan: &Plan, view: View<'_>, clear: bool) -> Option<Balance> {
             for (point, sum) in points.iter().zip(&mut sums) {
                 *sum += near_part(plan, view, point, NEAR[1] / count, &mut tally);
             }
-            let divisor = |sum: &Rgb, straight: &Rgb| {
-                let divisor = |c: usize| {
+            let divisors = |sum: &Rgb, straight: &Rgb| {
+                let both = |c: usize| {
                     // Some models send out more than has entered.
                     let (s, p) = (f64::from(sum[c]) / entered / f64::from(on_a_plane[c]), f64::from(total[c]).min(1.0));
-                    // What would leave by the other face of a sheet is lost where that is not there.
-                    let divisor = (s * p + 1.0 - p).max(if sheet { 1.0 } else { 0.0 });
                     // The share s p / divisor leaves, which is no more than what does not come through straight.
-                    divisor.max(s * p / f64::from((1.0 - straight[c]).max(LEAST_SCATTERED))) as f32
+                    let least = s * p / f64::from((1.0 - straight[c]).max(LEAST_SCATTERED));
+                    // What would leave by the other face of a sheet is lost where that is not there.
+                    [s * p + 1.0 - p, least.max(if sheet { 1.0 } else { 0.0 })].map(|v| v as f32)
                 };
                 // A channel that no light comes out of is as good as any.
-                Rgb::from_fn(|c| if divisor(c).is_normal() { divisor(c) } else { 1.0 })
+                let channels =
+                    [0, 1, 2].map(both).map(|[d, least]| if d.max(least).is_normal() { [d, least] } else { [1.0; 2] });
+                [0, 1].map(|k| Rgb::from_fn(|c| channels[c][k]))
             };
-            let known = |((p, sum), straight): ((&GatherPoint, &Rgb), &Rgb)| Known {
-                x: p.exit.x,
-                n: p.exit.n,
-                divisor: divisor(sum, straight),
+            let known = |((p, sum), straight): ((&GatherPoint, &Rgb), &Rgb)| {
+                let [divisor, least] = divisors(sum, straight);
+                Known { x: p.exit.x, n: p.exit.n, divisor, least }
             };
             points.iter().zip(&sums).zip(&straight).map(known).collect()
         })
