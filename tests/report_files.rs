@@ -79,7 +79,7 @@ fn a_full_disk_costs_no_result() {
     let folder = ball_under_sky();
     let folder = folder.path();
     // 512 bytes: no page, no table.
-    let output = with_small_files(folder, 1, "converge scene.toml --methods all,notes --time-budget 50ms -o out");
+    let output = with_small_files(folder, 1, "converge scene.toml --methods all,notes --time-budget 400ms -o out");
     let (said, table) = (text(&output.stderr), text(&output.stdout));
     assert_eq!(output.status.code(), Some(4), "{said}");
     assert!(said.contains("the smallest error") || said.contains("At equal time"), "{said}");
@@ -87,7 +87,7 @@ fn a_full_disk_costs_no_result() {
     assert!(table.lines().any(|l| l.starts_with("all,")) && table.lines().any(|l| l.starts_with("notes,")), "{table}");
     assert!(names(&folder.join("out")).iter().all(|n| !n.contains("tmp") && !n.contains("part")));
     // 2 kB: the table of `compare` goes through, the page does not.
-    let arguments = "compare scene.toml --models standard --truth all --time-budget 50ms -o out2";
+    let arguments = "compare scene.toml --models standard --truth all --time-budget 400ms -o out2";
     let output = with_small_files(folder, 4, arguments);
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(4), "{said}");
