@@ -34,7 +34,7 @@ impl std::fmt::Display for Choice {
     }
 }
 
-/// The same for what is made with `options`: the models of rough boundaries are few.
+/// What [`choose`] finds, or `standard` where that model has no rough boundary and `options` ask for one.
 pub fn choose_behind(medium: &Medium, options: &ModelOptions) -> Choice {
     let choice = choose(medium, options.thickness);
     if options.boundary.is_none() || choice.name.takes(ModelOption::Boundary) {

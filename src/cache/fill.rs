@@ -5,7 +5,6 @@ use crate::bssrdf::{Bssrdf, Entry};
 use crate::geometry::{AreaSample, AreaTable, Mesh, SurfacePoint, Union};
 use crate::light::{Arrival, Lights, Met};
 use crate::math::{Rgb, Vec3};
-use crate::optics::refract;
 use crate::query::Ray;
 use crate::sampling::CacheStream;
 use crate::scene::{Body, Scene, View};
@@ -59,14 +58,10 @@ impl CachedBody {
     /// Light as it enters at `at`, flat as the triangle it lies on, seen from there in the unit direction `w`: `irradiance` times
     /// `weight` [unit²] before the boundary, `u` in [0, 1) for the depth. `None` where it is totally reflected.
     pub fn enters(&self, at: &SurfacePoint, w: Vec3, (irradiance, weight): (Rgb, f32), u: f32) -> Option<CachedSample> {
-        // The models of rough boundaries do not ask where light goes inside.
-        let refracted = match self.boundary.rough {
-            None => refract(w, at.n, self.boundary.eta)?,
-            Some(_) => -at.n,
-        };
+        let inside = self.boundary.told(at.n, w)?;
         let flux = irradiance * (self.boundary.passed(w.dot(at.n)) * weight);
         (!flux.is_black()).then(|| CachedSample {
-            entry: Entry { x: (at.x - self.table().centre()).as_vec3(), n: at.n, w: refracted },
+            entry: Entry { x: (at.x - self.table().centre()).as_vec3(), n: at.n, w: inside },
             depth: self.model.sample_depth(u),
             flux,
         })

@@ -20,8 +20,9 @@ pub fn straight(plan: &Plan, view: View<'_>, at: &SurfacePoint, u: [f32; 2]) -> 
     for k in 0..DIRECTIONS {
         let shifted = [f32::from(k) / f32::from(DIRECTIONS), f32::from(k) * 0.618_034];
         let w = cosine_hemisphere(at.n, [0, 1].map(|i| (u[i] + shifted[i]).fract()));
+        let mut more = [shifted[1].fract(), shifted[0], u[0]].into_iter();
         let passed = plan.body.boundary.passed(w.dot(at.n));
-        if let Some((inside, weight)) = plan.body.boundary.enter(at.n, w, [shifted[1].fract(), shifted[0], u[0]]) {
+        if let Some((inside, weight)) = plan.body.boundary.enter(at.n, w, || more.next().unwrap_or(0.5)) {
             sum += through(plan, view, at, inside) * (passed * weight);
         }
         entered += passed;

@@ -8,10 +8,8 @@ use crate::bssrdf::{Entry, Exit};
 use crate::cache::{CachedSample, Plan};
 use crate::geometry::{Patches, SurfacePoint};
 use crate::math::{Rgb, Vec3, hash_combine};
-use crate::optics::refract;
 use crate::query::Ray;
 use crate::sampling::{PixelStream, cosine_hemisphere};
-use crate::surface::Interface;
 use crate::tally::Tally;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -149,19 +147,6 @@ impl Followed<'_> {
         self.follow_open(found);
     }
 
-    /// Where light goes on that comes from `w` and is reflected; its weight has a mean of 1.
-    pub fn mirror(
-        &self,
-        boundary: &Interface,
-        at: &SurfacePoint,
-        w: Vec3,
-        draws: &mut PathSampler,
-    ) -> Option<(Vec3, f32)> {
-        let smooth = boundary.rough.is_none();
-        let u = if smooth { [0.0; 3] } else { [draws.number(), draws.number(), draws.number()] };
-        boundary.mirror(at.n, w, u)
-    }
-
     /// Light that has passed the boundary, without a sample: what the cache has no need of.
     pub fn pass_on(&self, arrived: &Arrived<'_>, mut draws: PathSampler, found: &mut Found) {
         found.left = self.bounces;
@@ -183,7 +168,7 @@ impl Followed<'_> {
         let sample = plan.body.enters(&at, w, (flux, 1.0), depth);
         found.rows.extend(sample.map(|sample| (plan.body.object(), sample)));
         if draws.number() < plan.body.boundary.reflected(w.dot(at.n)) {
-            let (away, weight) = self.mirror(&plan.body.boundary, &at, w, draws)?;
+            let (away, weight) = plan.body.boundary.mirror(at.n, w, || draws.number())?;
             return Some((Ray::new(at.leave(away), away), flux * weight));
         }
         if self.walked[plan.body.object() as usize].is_some() {
@@ -209,12 +194,9 @@ impl Followed<'_> {
         let out = SurfacePoint { n: step.at.n_geometric, ..step.at };
         let away = cosine_hemisphere(out.n, draws.pair());
         // The boundary has been passed by the choice not to mirror.
-        let refracted = match plan.body.boundary.rough {
-            None => refract(w, at.n, plan.body.boundary.eta)?,
-            Some(_) => -at.n,
-        };
+        let inside = plan.body.boundary.told(at.n, w)?;
         let sample = CachedSample {
-            entry: Entry { x: Vec3::ZERO, n: at.n, w: refracted },
+            entry: Entry { x: Vec3::ZERO, n: at.n, w: inside },
             depth: plan.body.model.sample_depth(draws.number()),
             flux: flux * (PI * step.weight),
         };
@@ -230,11 +212,7 @@ impl Followed<'_> {
     /// What the model of the body lacks: light scattered less often, until it leaves.
     fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
-        let boundary = &plan.body.boundary;
-        let (inside, weight) = match boundary.rough {
-            None => (refract(w, at.n, boundary.eta)?, 1.0),
-            Some(_) => boundary.enter(at.n, w, [draws.number(), draws.number(), draws.number()])?,
-        };
+        let (inside, weight) = plan.body.boundary.enter(at.n, w, || draws.number())?;
         let flux = flux * weight;
         let from = (at.leave(inside), inside);
         let object = plan.body.object();

@@ -340,7 +340,7 @@ impl Round<'_> {
             let draws = PathSampler::new(&[], hash_combine(key, i));
             let mirrored = plan.body.boundary.reflected(w.dot(at.n));
             let mut own = draws.fork(0);
-            if let Some((away, weight)) = self.followed.mirror(&plan.body.boundary, &at, w, &mut own) {
+            if let Some((away, weight)) = plan.body.boundary.mirror(at.n, w, || own.number()) {
                 self.followed.follow(Ray::new(at.leave(away), away), flux * (mirrored * weight), own, found);
             }
             let passed = plan.body.boundary.passed(w.dot(at.n));

@@ -1,9 +1,10 @@
 //! What the boundary of a body does to light, in parts: for methods that ask a model for what is inside.
 
+use super::microfacets::local;
 use super::rough_boundary::Side;
-use super::{Boundary, Bsdf, BsdfSample, RoughBoundary};
+use super::{Bsdf, BsdfSample, RoughBoundary};
 use crate::geometry::SurfacePoint;
-use crate::math::{DVec3, Rgb, Vec3};
+use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use std::sync::Arc;
 
@@ -36,25 +37,26 @@ impl Interface {
         self.rough.as_ref().map_or_else(inside, |rough| 1.0 - rough.passed_from_inside(cosine))
     }
 
-    /// A direction inside of light that gets in from `w` outside, `n` being the unit normal, from numbers in [0, 1); its weight has a mean of 1.
-    pub fn enter(&self, n: Vec3, w: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
+    /// The direction inside that a model is told of light from the unit vector `w` outside, `n` being the unit normal; models of rough boundaries do not ask for
+    /// it. `None` where light is totally reflected.
+    pub fn told(&self, n: Vec3, w: Vec3) -> Option<Vec3> {
+        if self.rough.is_some() { Some(-n) } else { refract(w, n, self.eta) }
+    }
+
+    /// A direction inside of light that gets in from `w`, by a rough boundary from three numbers in [0, 1); its weight has a mean of 1.
+    pub fn enter(&self, n: Vec3, w: Vec3, mut number: impl FnMut() -> f32) -> Option<(Vec3, f32)> {
         let Some(rough) = &self.rough else { return Some((refract(w, n, self.eta)?, 1.0)) };
+        let u = [number(), number(), number()];
         let next = rough.sample(&flat(n), w, u).filter(|next| next.wi.dot(n) < 0.0)?;
         Some((next.wi, next.weight[0] / rough.passed(w.dot(n))))
     }
 
-    /// A direction of light that is reflected which comes from `w` outside; its weight has a mean of 1.
-    pub fn mirror(&self, n: Vec3, w: Vec3, u: [f32; 3]) -> Option<(Vec3, f32)> {
+    /// A direction of light that is reflected which comes from `w`, likewise.
+    pub fn mirror(&self, n: Vec3, w: Vec3, mut number: impl FnMut() -> f32) -> Option<(Vec3, f32)> {
         let Some(rough) = &self.rough else { return Some((reflect(w, n), 1.0)) };
+        let u = [number(), number(), number()];
         let next = RoughReflection(rough).sample(&flat(n), w, u).filter(|next| next.wi.dot(n) > 0.0)?;
         Some((next.wi, next.weight[0] / (1.0 - rough.passed(w.dot(n)))))
-    }
-
-    /// Which way light goes on that goes to `wo` from a point of the boundary, from either side.
-    pub fn cross(&self, at: &SurfacePoint, wo: Vec3, u: [f32; 3]) -> Option<BsdfSample> {
-        self.rough
-            .as_ref()
-            .map_or_else(|| Boundary { eta: self.eta }.sample(at, wo, u), |rough| rough.sample(at, wo, u))
     }
 }
 
@@ -86,26 +88,26 @@ impl RoughReflection<'_> {
 
 impl Bsdf for RoughReflection<'_> {
     fn eval(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> Rgb {
-        let ((side, _, n), local) = (self.0.seen_from(at, wo), super::microfacets::local);
+        let (side, _, n) = self.0.seen_from(at, wo);
         let wi = local(n, wi);
         if wi.z > 0.0 { Rgb::splat(self.value(side, local(n, wo), wi).0 / wi.z) } else { Rgb::BLACK }
     }
 
     fn sample(&self, at: &SurfacePoint, wo: Vec3, [u, v, which]: [f32; 3]) -> Option<BsdfSample> {
         let (side, _, n) = self.0.seen_from(at, wo);
-        let own = super::microfacets::local(n, wo);
+        let own = local(n, wo);
         let wi = if which < Self::once(side, own.z) {
             self.0.facets().sample(own, [u, v])
         } else {
             side.lost.sample([u, v])
         };
         let (value, pdf) = self.value(side, own, wi);
-        (pdf > 0.0).then(|| BsdfSample { wi: crate::math::frame(n) * wi, weight: Rgb::splat(value / pdf), pdf })
+        (pdf > 0.0).then(|| BsdfSample { wi: frame(n) * wi, weight: Rgb::splat(value / pdf), pdf })
     }
 
     fn pdf(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> f32 {
         let (side, _, n) = self.0.seen_from(at, wo);
-        self.value(side, super::microfacets::local(n, wo), super::microfacets::local(n, wi)).1
+        self.value(side, local(n, wo), local(n, wi)).1
     }
 
     fn albedo(&self) -> Rgb {

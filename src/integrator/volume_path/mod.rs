@@ -1,4 +1,4 @@
-//! Paths through a scene and through homogeneous media behind smooth boundaries: the truth that the models of `bssrdf` approach,
+//! Paths through a scene and through homogeneous media behind smooth or rough boundaries: the truth that the models of `bssrdf` approach,
 //! and all that is between bodies for the methods that have those models.
 //! Read first: `camera.rs` (a path through the scene), `interior.rs` (inside one body), then `connect.rs` (what makes it fast).
 
@@ -75,7 +75,7 @@ impl Default for VolumePathOptions {
 }
 
 /// Unbiased light transport: Lambertian surfaces, lamps, environment, and homogeneous media with Henyey-Greenstein
-/// scattering inside closed meshes with a smooth dielectric boundary.
+/// scattering inside closed meshes with a dielectric boundary, smooth or rough.
 pub struct VolumePath {
     options: VolumePathOptions,
     light: DirectLight,

@@ -299,9 +299,7 @@ impl CameraPath<'_> {
 
     /// A direction inside of light that gets in from `w`, weighted by a mean of 1.
     fn enters(&mut self, boundary: &Interface, n: Vec3, w: Vec3) -> Option<Vec3> {
-        let smooth = boundary.rough.is_none();
-        let u = if smooth { [0.0; 3] } else { [self.draws.number(), self.draws.number(), self.draws.number()] };
-        let (inside, weight) = boundary.enter(n, w, u)?;
+        let (inside, weight) = boundary.enter(n, w, || self.draws.number())?;
         self.spectrum.scale(Rgb::splat(weight));
         Some(inside)
     }
