@@ -406,7 +406,7 @@ fn what_is_refused_says_why() {
             scene,
             &[
                 "object \"wall\"",
-                "\"wall\" is a picture",
+                "\"wall\" has a picture",
                 "1 of 2 triangles of bare.obj has no texture coordinates",
                 "`vt`",
             ],

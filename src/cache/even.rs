@@ -60,7 +60,7 @@ pub fn balance(plan: &Plan, view: View<'_>, clear: bool) -> Option<Balance> {
         let numbers = light.numbers(i);
         let at = flat(numbers)?;
         let w = cosine_hemisphere(at.n, [numbers.1[2], numbers.1[3]]);
-        Some(body.enters(&at, w, (Rgb::WHITE, body.table().area() as f32), numbers.1[4]))
+        Some(body.enters_untinted(&at, w, (Rgb::WHITE, body.table().area() as f32), numbers.1[4]))
     };
     let entering: Vec<Option<CachedSample>> = (0..u64::from(SAMPLES)).into_par_iter().filter_map(enter).collect();
     // Of all area that of the body's surface: what lies inside a union bears no light.
@@ -137,7 +137,7 @@ fn near_part(plan: &Plan, view: View<'_>, point: &GatherPoint, count: u32, tally
         let step = near.step(view, &plan.body, (point.place, exit.n), numbers, tally)?;
         let at = SurfacePoint { n: step.at.n_geometric, ..step.at };
         let w = cosine_hemisphere(at.n, [u[0], u[1]]);
-        let sample = plan.body.enters(&at, w, (Rgb::WHITE, step.weight), u[2])?;
+        let sample = plan.body.enters_untinted(&at, w, (Rgb::WHITE, step.weight), u[2])?;
         Some(plan.near_part(near, &exit, &sample, (step.place - point.place).as_vec3(), tally))
     };
     (0..count).filter_map(&mut one).fold(Rgb::BLACK, |sum, part| sum + part) * (1.0 / count as f32)

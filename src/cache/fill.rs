@@ -31,8 +31,9 @@ impl CachedBody {
     pub fn new(scene: &Scene, object: u32, model: Box<dyn Bssrdf>) -> Option<Self> {
         let body = scene.body(object)?.clone();
         let surface = scene.surface(object);
-        let rough = surface.inside.as_ref().and_then(|inside| inside.rough.clone());
-        let boundary = Interface { eta: surface.medium()?.eta, rough };
+        let inside = surface.inside.as_ref();
+        let (rough, tint) = (inside.and_then(|t| t.rough.clone()), inside.and_then(|t| t.tint.clone()));
+        let boundary = Interface { eta: surface.medium()?.eta, rough, tint };
         Some(Self { boundary, body, union: scene.union(object).cloned(), model })
     }
 
@@ -58,6 +59,17 @@ impl CachedBody {
     /// Light as it enters at `at`, flat as the triangle it lies on, seen from there in the unit direction `w`: `irradiance` times
     /// `weight` [unit²] before the boundary, `u` in [0, 1) for the depth. `None` where it is totally reflected.
     pub fn enters(&self, at: &SurfacePoint, w: Vec3, (irradiance, weight): (Rgb, f32), u: f32) -> Option<CachedSample> {
+        self.enters_untinted(at, w, (irradiance * self.boundary.tint(at), weight), u)
+    }
+
+    /// The same without the pigment of the boundary.
+    pub fn enters_untinted(
+        &self,
+        at: &SurfacePoint,
+        w: Vec3,
+        (irradiance, weight): (Rgb, f32),
+        u: f32,
+    ) -> Option<CachedSample> {
         let inside = self.boundary.told(at.n, w)?;
         let flux = irradiance * (self.boundary.passed(w.dot(at.n)) * weight);
         (!flux.is_black()).then(|| CachedSample {

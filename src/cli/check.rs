@@ -8,9 +8,10 @@ use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
 use marmor::geometry::{Mended, load_obj_with_uv, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
+use marmor::math::Rgb;
 use marmor::optics::{ChannelOptics, HalfSpace, Medium};
 use marmor::query;
-use marmor::scene::{Emission, FilterName, Geometry, Object, Projection, Scene, SceneFile, Surface};
+use marmor::scene::{Emission, FilterName, Geometry, Object, Projection, Scene, SceneFile, Surface, Translucent};
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -287,7 +288,7 @@ fn describe(surface: &Surface) -> Vec<String> {
                 ),
                 format!(
                     "colour [{}]: what a thick body of it gives back of even light, the mirror image aside{}",
-                    colour(&t.medium).map(|v| digits(v, 3)).join(", "),
+                    colour(t).map(|v| digits(v, 3)).join(", "),
                     if t.medium.g == 0.0 { "" } else { " (as if g were 0)" }
                 ),
             ]
@@ -295,10 +296,12 @@ fn describe(surface: &Surface) -> Vec<String> {
     }
 }
 
-/// Diffuse reflectance of a half space under even light.
-fn colour(medium: &Medium) -> [f64; 3] {
-    let half_space = HalfSpace::new(medium.eta.into());
-    ChannelOptics::of(medium).map(|k| half_space.even_reflectance(k.absorbed_prime))
+/// Diffuse reflectance of a half space under even light, by pigment of the same place inwards and outwards.
+fn colour(t: &Translucent) -> [f64; 3] {
+    let half_space = HalfSpace::new(t.medium.eta.into());
+    let tint = t.tint.as_ref().map_or(Rgb::WHITE, |tint| tint.shares().map(|share| share * share).mean());
+    let reflectance = ChannelOptics::of(&t.medium).map(|k| half_space.even_reflectance(k.absorbed_prime));
+    std::array::from_fn(|c| reflectance[c] * f64::from(tint[c]))
 }
 
 fn object_json(scene: &Scene, object: &Object, share: f64) -> Value {

@@ -77,7 +77,7 @@ pub fn of(prepared: &Prepared, window: Window, view: Option<View<'_>>) -> Need {
     let tables: u64 = scene.objects.iter().map(table).sum();
     let sky = scene.environment.image.as_ref().map_or(0, |image| image.pixels.len() as u64);
     let mut textures: Vec<&Texture> = Vec::new();
-    for texture in scene.materials.iter().filter_map(|m| m.surface.bsdf.texture()) {
+    for texture in scene.materials.iter().flat_map(|m| m.surface.pictures()) {
         if !textures.iter().any(|known| std::ptr::eq(*known, &**texture)) {
             textures.push(texture);
         }

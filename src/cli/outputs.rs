@@ -152,7 +152,7 @@ fn identity(prepared: &Prepared, backend: &str, window: Window) -> Identity {
         facts.push(("picture of the environment".into(), what));
     }
     facts.extend(scene.materials.iter().filter_map(|material| {
-        let texture = material.surface.bsdf.texture()?;
+        let texture = material.surface.pictures().next()?;
         let [width, height] = texture.resolution();
         let what = format!("{}, {width}x{height} pixels, hash {:016x}", texture.name(), texture.fingerprint());
         Some((format!("picture of material {}", material.name), what))

@@ -231,10 +231,23 @@ pub fn thickened(mesh: &ObjMesh, thickness: f64) -> Result<Thick, NoSheet> {
     }
     let mut triangles = front.clone();
     triangles.extend(front.iter().map(|&[a, b, c]| [a, c, b].map(back)));
+    let mut uv = mesh.uv.as_ref().map(|uv| {
+        let own =
+            surface.triangles.iter().map(|&(t, turn)| uv[t].map(|[a, b, c]| if turn { [a, c, b] } else { [a, b, c] }));
+        let own: Vec<_> = own.collect();
+        let behind = own.iter().map(|uv| uv.map(|[a, b, c]| [a, c, b]));
+        own.iter().copied().chain(behind).collect::<Vec<_>>()
+    });
     for uses in uses(&edges).filter(|uses| uses.len() == 1) {
         let (low, high, _, number) = uses[0];
         let Some([a, b]) = run_along(front[number], &surface.place, [low, high]) else { continue };
         triangles.extend([[b, a, back(a)], [b, back(a), back(b)]]);
+        if let Some(uv) = &mut uv {
+            let own = uv[number];
+            let at = |i: u32| front[number].iter().position(|k| *k == i).zip(own).map_or([0.0; 2], |(k, own)| own[k]);
+            let (a, b) = (at(a), at(b));
+            uv.extend([own.map(|_| [b, a, a]), own.map(|_| [b, a, b])]);
+        }
     }
     let normals = mesh.normals.as_ref().map(|normals| {
         let count = normals.vectors.len() as u32;
@@ -246,7 +259,7 @@ pub fn thickened(mesh: &ObjMesh, thickness: f64) -> Result<Thick, NoSheet> {
         let vectors = normals.vectors.iter().copied().chain(normals.vectors.iter().map(|n| -*n)).collect();
         ObjNormals { vectors, triangles: all }
     });
-    Ok(Thick { mesh: ObjMesh { triangles, normals, remarks: mesh.remarks.clone(), ..body }, blunted })
+    Ok(Thick { mesh: ObjMesh { triangles, normals, uv, remarks: mesh.remarks.clone(), ..body }, blunted })
 }
 
 /// The edge of a triangle whose corners are at two places, in its own direction.

@@ -8,8 +8,9 @@ use crate::geometry::SurfacePoint;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::scene::{Scene, Surface};
-use crate::surface::Lambertian;
+use crate::surface::{Bsdf, Lambertian, Textured};
 use crate::tally::Tally;
+use std::sync::Arc;
 
 /// Opaque surfaces under the scene's lights, without interreflection. A translucent surface is shown as
 /// a Lambertian one with its model's diffuse reflectance: a preview.
@@ -31,16 +32,24 @@ impl Direct {
 }
 
 /// Lambertian surfaces that stand for translucent ones, of the reflectance of their models; one for each object, `None` of others.
-pub(super) fn stand_ins(scene: &Scene) -> Result<Vec<Option<Lambertian>>> {
+pub(super) fn stand_ins(scene: &Scene) -> Result<Vec<Option<Arc<dyn Bsdf>>>> {
     let of = |surface: &Surface| {
         let Some(inside) = &surface.inside else { return Ok(None) };
-        Ok(Some(Lambertian { albedo: inside.build()?.total() }))
+        let total = inside.build()?.total();
+        // Light goes in and out by pigment of about the same place.
+        let albedo =
+            inside.tint.as_ref().map(|tint| Arc::new(tint.shares().map(|t| total.map(|v| v.min(1.0)) * t * t)));
+        let stand_in: Arc<dyn Bsdf> = match albedo {
+            Some(albedo) => Arc::new(Textured { albedo }),
+            None => Arc::new(Lambertian { albedo: total }),
+        };
+        Ok(Some(stand_in))
     };
     scene.objects.iter().map(|o| of(&scene.materials[o.material].surface)).collect()
 }
 
 /// The Lambertian albedo of all surfaces, or of what stands for them.
-pub(super) struct Albedos(Vec<Option<Lambertian>>);
+pub(super) struct Albedos(Vec<Option<Arc<dyn Bsdf>>>);
 
 impl Albedos {
     /// # Errors
@@ -52,7 +61,7 @@ impl Albedos {
     /// At a point of the surface of `object`.
     pub(super) fn at(&self, scene: &Scene, object: u32, at: &SurfacePoint) -> Rgb {
         match &self.0[object as usize] {
-            Some(stand_in) => stand_in.albedo,
+            Some(stand_in) => stand_in.albedo_at(at),
             None => scene.surface(object).bsdf.albedo_at(at),
         }
     }

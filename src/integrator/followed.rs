@@ -171,8 +171,12 @@ impl Followed<'_> {
             let (away, weight) = plan.body.boundary.mirror(at.n, w, || draws.number())?;
             return Some((Ray::new(at.leave(away), away), flux * weight));
         }
+        let flux = flux * plan.body.boundary.tint(&at);
+        if flux.is_black() {
+            return None;
+        }
         if self.walked[plan.body.object() as usize].is_some() {
-            return self.walk(arrived, draws, found);
+            return self.walk(&Arrived { flux, ..*arrived }, draws, found);
         }
         let walks = self.paths.walks(plan.body.object());
         let steps = plan.near.is_some();
@@ -203,17 +207,20 @@ impl Followed<'_> {
         let exit = Exit { x: Vec3::ZERO, n: out.n, w: away };
         let passed = plan.near_part(near, &exit, &sample, (at.x - step.place).as_vec3(), &mut found.tally)
             * plan.balance_at(step.place, exit.n);
-        let left = passed * plan.body.boundary.passed(away.dot(out.n));
+        let left = passed * plan.body.boundary.tint(&out) * plan.body.boundary.passed(away.dot(out.n));
         let chance = (left.max() / flux.max()).min(1.0);
         let goes_on = draws.number() < chance;
         goes_on.then(|| (Ray::new(out.leave(away), away), left * (1.0 / chance)))
     }
 
-    /// What the model of the body lacks: light scattered less often, until it leaves.
+    /// What the model of the body lacks: light scattered less often, until it leaves. What arrived has passed the boundary.
     fn walk(&self, arrived: &Arrived<'_>, draws: &mut PathSampler, found: &mut Found) -> Option<(Ray, Rgb)> {
         let &Arrived { plan, at, w, flux } = arrived;
         let (inside, weight) = plan.body.boundary.enter(at.n, w, || draws.number())?;
         let flux = flux * weight;
+        if flux.is_black() {
+            return None;
+        }
         let from = (at.leave(inside), inside);
         let object = plan.body.object();
         if let (Some(Some(body)), Some(Some(patches))) =
@@ -234,7 +241,8 @@ impl Followed<'_> {
                         n: exit.at.n_geometric,
                     });
                 }
-                open.push((Ray::new(exit.at.leave(exit.w), exit.w), flux, draws, *left));
+                let passed = flux * plan.body.boundary.tint(&exit.at);
+                open.push((Ray::new(exit.at.leave(exit.w), exit.w), passed, draws, *left));
             };
             self.paths.walk_through((self.view, object), (from, flux), body.windows(), draws.fork(1), tally, each);
             return None;

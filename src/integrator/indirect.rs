@@ -190,7 +190,8 @@ impl Indirect {
             let builder = plan.builder(view, lights, stream, plan.density());
             let entering = |i: u64| {
                 let (at, w, flux) = builder.arriving(i, &mut Tally::default())?;
-                let passed = plan.body.boundary.passed(w.dot(at.n)) / self.count as f32;
+                let boundary = &plan.body.boundary;
+                let passed = boundary.tint(&at) * (boundary.passed(w.dot(at.n)) / self.count as f32);
                 (!flux.is_black()).then(|| (at.x, flux * passed))
             };
             let entering: Vec<_> = (0..u64::from(self.count)).into_par_iter().filter_map(entering).collect();
@@ -343,7 +344,7 @@ impl Round<'_> {
             if let Some((away, weight)) = plan.body.boundary.mirror(at.n, w, || own.number()) {
                 self.followed.follow(Ray::new(at.leave(away), away), flux * (mirrored * weight), own, found);
             }
-            let passed = plan.body.boundary.passed(w.dot(at.n));
+            let passed = plan.body.boundary.tint(&at) * plan.body.boundary.passed(w.dot(at.n));
             let arrived = Arrived { plan, at, w, flux: flux * passed };
             self.followed.pass_on(&arrived, draws, found);
         });
@@ -407,7 +408,8 @@ impl Round<'_> {
                 }
                 for ((at, point), sum) in places.iter().zip(&points).zip(&sums) {
                     let w = point.exit.w;
-                    let flux = *sum * (each * plan.body.boundary.passed(w.dot(at.n)));
+                    let passed = plan.body.boundary.passed(w.dot(at.n));
+                    let flux = *sum * (each * passed) * plan.body.boundary.tint(at);
                     self.followed.follow(
                         Ray::new(at.leave(w), w),
                         flux,

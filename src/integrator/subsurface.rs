@@ -130,17 +130,19 @@ impl Subsurface {
         let (mut scratch, mut sums) = (Scratch::default(), Vec::new());
         for group in translucent.chunk_by(|a, b| a.0 == b.0) {
             let (Some(plan), Some(gatherer)) = (&self.plans[group[0].0], &pass[group[0].0]) else { continue };
+            let boundary = &plan.body.boundary;
             let point = |&(_, i): &(usize, usize)| {
                 let (w, hit) = (-rays[i].ray.direction, hits[i].as_ref()?);
                 let at = view.point(hit, -w);
                 let x = (at.x - plan.body.table().centre()).as_vec3();
                 let exit = Exit { x, n: at.normal_seen_from(w), w };
-                Some(GatherPoint { exit, place: at.x, stream: rays[i].stream })
+                let passed = boundary.tint(&at) * boundary.passed(exit.n.dot(w));
+                Some((GatherPoint { exit, place: at.x, stream: rays[i].stream }, passed))
             };
-            let points: Vec<GatherPoint> = group.iter().filter_map(point).collect();
+            let (points, passed): (Vec<GatherPoint>, Vec<Rgb>) = group.iter().filter_map(point).unzip();
             plan.gather((view, &self.light.lights), (gatherer, Detail::Fine), &points, &mut scratch, tally, &mut sums);
-            for ((&(_, i), point), &sum) in group.iter().zip(&points).zip(&sums) {
-                inside[i] = sum * plan.body.boundary.passed(point.exit.n.dot(point.exit.w));
+            for ((&(_, i), &passed), &sum) in group.iter().zip(&passed).zip(&sums) {
+                inside[i] = sum * passed;
                 if let (Some(single), Some(hit)) = (&self.single, &hits[i]) {
                     inside[i] += single.radiance(view, &rays[i], hit, tally);
                 }

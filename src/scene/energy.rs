@@ -237,6 +237,7 @@ mod tests {
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
+            tint: None,
             rough: None,
             source: String::new(),
         };
@@ -266,6 +267,7 @@ mod tests {
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
+            tint: None,
             rough: None,
             source: String::new(),
         };

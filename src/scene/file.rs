@@ -123,8 +123,8 @@ impl SceneFile {
         });
         let sky = self.environment.image.iter().map(|path| ("the picture of [environment]".to_string(), path));
         let pictures = self.materials.iter().filter_map(|material| {
-            let texture = material.albedo_image.as_ref()?;
-            Some((format!("the picture of material {:?}", material.name), &texture.image))
+            let picture = material.picture.as_ref()?;
+            Some((format!("the picture of material {:?}", material.name), &picture.image.image))
         });
         let all = meshes.chain(sky).chain(pictures).map(|(what, path)| (what, folder.join(path)));
         all.filter(|(_, path)| seen.insert(path.clone())).collect()

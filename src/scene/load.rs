@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use super::file::SceneFile;
 use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
+use super::textures::Loader;
 use super::{
-    Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets,
-    textures, warnings,
+    Insides, LightSource, Object, Obstacle, ObstacleKind, Scene, Surface, Translucent, eye, precision, sheets, warnings,
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
@@ -38,14 +38,10 @@ impl Scene {
         let mut said = Vec::new();
         let folder = file.path.parent().unwrap_or(Path::new(""));
         let environment = file.environment.load(folder, &mut said)?;
-        let pictures = textures::load(file.materials.iter().map(|m| m.albedo_image.as_ref()), folder, &mut said)?;
+        let mut loader = Loader::new(folder, &mut said);
+        let surfaces: Vec<Surface> = file.materials.iter().map(|m| m.pictured(&mut loader)).collect::<Result<_>>()?;
         let placed = meshes(file, folder, repair, &mut said)?;
-        let (mut materials, of_objects) = sheets::materials(file, &mut said)?;
-        for (material, albedo) in materials.iter_mut().zip(pictures) {
-            if let Some(albedo) = albedo {
-                material.surface = Surface::textured(albedo);
-            }
-        }
+        let (materials, of_objects) = sheets::materials(file, &surfaces, &mut said)?;
         let translucent = |entry: &ObjectEntry| file.materials[entry.material].surface.is_translucent();
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
@@ -187,7 +183,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
         Geometry::Mesh(path) => Some(folder.join(path)),
         _ => None,
     };
-    let has_picture = |entry: &ObjectEntry| file.materials[entry.material].albedo_image.is_some();
+    let has_picture = |entry: &ObjectEntry| file.materials[entry.material].picture.is_some();
     let with_uv: HashSet<PathBuf> =
         file.objects.iter().filter(|entry| has_picture(entry)).filter_map(path_of).collect();
     let mut uses: HashMap<PathBuf, usize> = HashMap::new();
@@ -239,7 +235,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
 /// Refuses an object that has a picture and no coordinates for it.
 fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> {
     let (material, all) = (&file.materials[entry.material], mesh.triangles.len());
-    let without = if material.albedo_image.is_some() { mesh.without_uv() } else { 0 };
+    let without = if material.picture.is_some() { mesh.without_uv() } else { 0 };
     if without == 0 {
         return Ok(());
     }
@@ -248,7 +244,7 @@ fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> 
         _ => "its shape".into(),
     };
     Err(Error::scene(format!(
-        "{}: object {:?}: its material {:?} is a picture, but {without} of {} of {mesh} {} no texture coordinates; export them \
+        "{}: object {:?}: its material {:?} has a picture, but {without} of {} of {mesh} {} no texture coordinates; export them \
          (`vt`, at each corner of each face), or give the object another material",
         entry.at,
         entry.name,

@@ -1,13 +1,14 @@
 //! `[material.NAME]` as typed.
 
+use super::textures::Loader;
 use super::tree::{Fields, Node};
 use super::values::{self, RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
 use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, opaque, textures};
 use crate::bssrdf::ModelName;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Rgb;
 use crate::optics::{Look, Medium, Preset};
-use crate::surface::{Bsdf as _, RoughBoundary};
+use crate::surface::{Bsdf as _, RoughBoundary, Tint};
 use std::sync::Arc;
 
 /// One material, its coefficients already per scene unit.
@@ -17,12 +18,31 @@ pub struct MaterialEntry {
     pub name: String,
     /// The kind and its numbers.
     pub surface: Surface,
-    /// The picture that its albedo is, of a diffuse one; [`Self::surface`] is white then.
-    pub albedo_image: Option<TextureEntry>,
+    /// Its picture, if it has one; until that is read [`Self::surface`] has something in its place.
+    pub picture: Option<Picture>,
     /// File and line, for messages.
     pub at: String,
     /// What is wrong with it unless each of its objects has a `thickness`.
     pub(super) without_thickness: Option<String>,
+}
+
+/// A picture, and what it says.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// The picture.
+    pub image: TextureEntry,
+    of: Of,
+}
+
+/// What a picture says.
+#[derive(Clone, Debug)]
+enum Of {
+    /// Albedo of a diffuse surface.
+    Albedo,
+    /// Tint of a boundary.
+    Tint,
+    /// Colour of a translucent body, the rest of whose look, and factor of whose coefficients, are these.
+    Colour(Look, f64),
 }
 
 const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "plastic", "conductor", "emissive"];
@@ -40,13 +60,18 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             "\"translucent\", \"dielectric\", \"diffuse\", \"plastic\", \"conductor\" or \"emissive\"",
             Node::text,
         )?;
-        let (mut without_thickness, mut albedo_image) = (None, None);
-        textures::refuse_elsewhere(&m, (kind == "diffuse").then_some("albedo"))?;
+        let (mut without_thickness, mut picture) = (None, None);
+        let places: &[&str] = match kind {
+            "diffuse" => &["albedo"],
+            "translucent" => &["tint", "colour"],
+            _ => &[],
+        };
+        textures::refuse_elsewhere(&m, places)?;
         let surface = match kind {
-            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), &mut without_thickness)?,
+            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), (&mut without_thickness, &mut picture))?,
             "diffuse" => {
-                albedo_image = textures::read(&m, "albedo")?;
-                opaque::diffuse(&m, albedo_image.is_some())?
+                picture = textures::read(&m, "albedo")?.map(|image| Picture { image, of: Of::Albedo });
+                opaque::diffuse(&m, picture.is_some())?
             }
             "conductor" => opaque::conductor(&m)?,
             "plastic" => opaque::plastic(&m)?,
@@ -63,9 +88,60 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),
         };
-        Ok(MaterialEntry { name: name.to_string(), surface, albedo_image, at: m.at(), without_thickness })
+        Ok(MaterialEntry { name: name.to_string(), surface, picture, at: m.at(), without_thickness })
     });
     entries.collect()
+}
+
+impl MaterialEntry {
+    /// The surface with its picture.
+    ///
+    /// # Errors
+    /// A picture that cannot be read, or that is no colour of a body.
+    pub(super) fn pictured(&self, loader: &mut Loader<'_>) -> Result<Surface> {
+        let Some(Picture { image, of }) = &self.picture else { return Ok(self.surface.clone()) };
+        let texture = loader.load(image)?;
+        let with = |change: &dyn Fn(&mut Translucent)| {
+            let mut inside = self.surface.inside.clone();
+            inside.iter_mut().for_each(change);
+            Surface { inside, ..self.surface.clone() }
+        };
+        Ok(match of {
+            Of::Albedo => Surface::textured(texture),
+            Of::Tint => with(&|t| t.dye(Tint::picture(texture.clone()))),
+            Of::Colour(look, scale) => {
+                let refused = |what: String| Error::scene(format!("{}: {what}", image.at));
+                let largest = texture.largest();
+                if let Some(c) = (0..3).find(|&c| largest[c] <= 0.0 || largest[c] >= 1.0) {
+                    return Err(refused(format!(
+                        "the largest {} of {} is {}: a colour is above 0 and below 1 where it is brightest; give a `scale`, as 0.9, or take `tint`",
+                        ["red", "green", "blue"][c],
+                        texture.name(),
+                        largest[c]
+                    )));
+                }
+                let look = Look { colour: largest.0.map(f64::from), ..*look };
+                let medium = look.medium().map_err(|e| refused(e.to_string()))?;
+                let medium = scaled(medium, *scale).checked().map_err(|e| refused(e.to_string()))?;
+                // What enters and leaves at one point has been through the pigment twice.
+                let tint = Tint::picture(Arc::new(texture.map(|t| Rgb::from_fn(|c| (t[c] / largest[c]).sqrt()))));
+                let surface = with(&|t| {
+                    t.medium = medium;
+                    t.dye(tint.clone());
+                });
+                if let Some(inside) = &surface.inside {
+                    inside.build().map_err(|e| refused(e.to_string()))?;
+                }
+                surface
+            }
+        })
+    }
+}
+
+/// With both coefficients multiplied.
+fn scaled(medium: Medium, scale: f64) -> Medium {
+    let by = |c: Rgb| if scale == 1.0 { c } else { c.map(|v| (f64::from(v) * scale) as f32) };
+    Medium { sigma_a: by(medium.sigma_a), sigma_s: by(medium.sigma_s), ..medium }
 }
 
 /// Clear glass, water, air: refraction, and absorption if there is any.
@@ -84,7 +160,11 @@ fn refractive_index(n: &Node) -> Option<f64> {
     n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0)
 }
 
-fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<String>) -> Result<Surface> {
+fn translucent(
+    m: &Fields<'_>,
+    unit_in_mm: f64,
+    (without_thickness, picture): (&mut Option<String>, &mut Option<Picture>),
+) -> Result<Surface> {
     let keys = [
         "type",
         "preset",
@@ -102,22 +182,24 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
         "calibrated",
         "exit_normalisation",
         "roughness",
+        "tint",
     ];
     m.only("a translucent material", &keys)?;
     let scale = m.get("scale", "a number above 0", |n| n.number().filter(|v| *v > 0.0))?.unwrap_or(1.0);
     let eta = m.get("eta", ETA, refractive_index)?;
-    let (mut medium, source) = match m.get("preset", "the name of a measured medium or of a look", Node::text)? {
+    let colours = textures::read(m, "colour")?;
+    let mut by_colour = None;
+    let (medium, source) = match m.get("preset", "the name of a measured medium or of a look", Node::text)? {
         Some(name) => preset(m, name, unit_in_mm, eta)?,
         None if m.has("colour") || m.has("mean_free_path") => {
-            (look(m, unit_in_mm, eta)?, format!("{}, from its colour", m.at()))
+            let look = look(m, unit_in_mm, eta, colours.is_some())?;
+            by_colour = colours.map(|image| Picture { image, of: Of::Colour(look, scale) });
+            let medium = look.medium().map_err(|e| m.error(format!("{e}; see `per` and `mean_free_path`")))?;
+            (medium, format!("{}, from its colour", m.at()))
         }
         None => (numbers(m, unit_in_mm, eta)?, m.at()),
     };
-    if scale != 1.0 {
-        let scaled = |c: Rgb| c.map(|v| (f64::from(v) * scale) as f32);
-        (medium.sigma_a, medium.sigma_s) = (scaled(medium.sigma_a), scaled(medium.sigma_s));
-    }
-    let medium = medium.checked().map_err(|e| m.error(format!("{e}; see `per` and `scale`")))?;
+    let medium = scaled(medium, scale).checked().map_err(|e| m.error(format!("{e}; see `per` and `scale`")))?;
     let positive = |n: &Node| n.number().filter(|v| (*v as f32).is_normal() && *v > 0.0);
     let roughness = m.get("roughness", "a number from 0 to 1", |n| n.number().filter(|v| (0.0..=1.0).contains(v)))?;
     let rough = roughness.and_then(|roughness| RoughBoundary::new(medium.eta, roughness as f32));
@@ -125,15 +207,31 @@ fn translucent(m: &Fields<'_>, unit_in_mm: f64, without_thickness: &mut Option<S
         Some(rough) => format!("{source}, {}", rough.text()),
         None => source,
     };
-    let translucent = Translucent {
+    let tints = textures::read(m, "tint")?.map(|image| Picture { image, of: Of::Tint });
+    let share = |n: &Node| colour(n, |v| (0.0..=1.0).contains(&v));
+    let tint = match &tints {
+        None => m.get("tint", "one number or three from 0 to 1, or { image = \"FILE\" }", share)?,
+        Some(_) => None,
+    };
+    if let (Some(_), true) = (&by_colour, m.has("tint")) {
+        return Err(
+            m.error_at("tint", "stands beside a picture for `colour`, which tints the boundary: remove one of them")
+        );
+    }
+    *picture = by_colour.or(tints);
+    let mut translucent = Translucent {
         medium,
         rough: rough.map(Arc::new),
+        tint: None,
         model: named_value(m, "model")?.unwrap_or(ModelName::AUTO),
         thickness: m.get("thickness", "a number of units above 0", positive)?.map(|v| v as f32),
         calibrated: switch(m, "calibrated")?.unwrap_or(false),
         exit_normalisation: switch(m, "exit_normalisation")?.unwrap_or(true),
         source,
     };
+    if let Some(share) = tint {
+        translucent.dye(Tint::even(rgb(share)));
+    }
     match translucent.build().map_err(|e| m.error(e)) {
         Err(e) if translucent.model == ModelName::SLAB && translucent.thickness.is_none() => {
             *without_thickness = Some(format!("{e}, or a `thickness` of each open mesh that it is the material of"));
@@ -166,8 +264,8 @@ fn preset(m: &Fields<'_>, name: &str, unit_in_mm: f64, eta: Option<f64>) -> Resu
     })
 }
 
-/// A medium from how it looks.
-fn look(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> {
+/// How a medium looks; with a picture for its colour, some colour until that is read.
+fn look(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>, has_picture: bool) -> Result<Look> {
     if let Some(key) = ["sigma_s_prime", "sigma_s", "sigma_a"].into_iter().find(|key| m.has(key)) {
         return Err(m.error_at(
             key,
@@ -176,14 +274,14 @@ fn look(m: &Fields<'_>, unit_in_mm: f64, eta: Option<f64>) -> Result<Medium> {
     }
     let expected =
         "one number or three, from 0 to below 1: what absorbs nothing has `sigma_a` = 0 in place of a colour";
-    let colour = m.need("colour", expected, |n| values::colour(n, |v| (0.0..1.0).contains(&v)))?;
+    let typed = |n: &Node| values::colour(n, |v| (0.0..1.0).contains(&v));
+    let colour = if has_picture { [0.5; 3] } else { m.need("colour", expected, typed)? };
     let length = |n: &Node| values::colour(n, |v| v > 0.0 && (v as f32).is_normal());
     let lengths = m.need("mean_free_path", "one length or three above 0", length)?;
     let per = m.get("per", UNIT, unit)?;
     let mean_free_path = lengths.map(|l| per.map_or(l, |per| l * (per / unit_in_mm)));
     let eta = eta.ok_or_else(|| m.missing("eta", ETA))?;
-    let look = Look { colour, mean_free_path, g: cosine(m)?.unwrap_or(0.0), eta };
-    look.medium().map_err(|e| m.error(format!("{e}; see `per` and `mean_free_path`")))
+    Ok(Look { colour, mean_free_path, g: cosine(m)?.unwrap_or(0.0), eta })
 }
 
 /// The mean cosine, if it is there.

@@ -3,7 +3,7 @@
 use super::file::SceneFile;
 use super::objects::ObjectEntry;
 use super::options::MethodName;
-use super::{Material, Object};
+use super::{Material, Object, Surface};
 use crate::bssrdf::ModelName;
 use crate::error::{Error, Result};
 use crate::geometry::{MITER_LIMIT, NoSheet, ObjMesh, Precision, Seek, Solid, examine, meeting, thickened};
@@ -113,14 +113,18 @@ pub(super) fn refuse_folds(entry: &ObjectEntry, object: &Object, centre: DVec3) 
     Err(refused(entry, what, "take a smaller `thickness`, or pull its folds apart"))
 }
 
-/// All materials, and which of them each object has: that of a sheet knows its thickness. Objects of one material and several
+/// All materials, whose `surfaces` are these, and which of them each object has: that of a sheet knows its thickness. Objects of one material and several
 /// thicknesses have copies of it.
 ///
 /// # Errors
 /// A sheet that is too thin, or too thick, for the model `slab` of its material.
-pub(super) fn materials(file: &SceneFile, said: &mut Vec<String>) -> Result<(Vec<Material>, Vec<usize>)> {
-    let made = file.materials.iter().map(|m| {
-        let mut surface = m.surface.clone();
+pub(super) fn materials(
+    file: &SceneFile,
+    surfaces: &[Surface],
+    said: &mut Vec<String>,
+) -> Result<(Vec<Material>, Vec<usize>)> {
+    let made = file.materials.iter().zip(surfaces).map(|(m, surface)| {
+        let mut surface = surface.clone();
         if let (Some(t), Some(model)) = (&mut surface.inside, file.method.model) {
             t.model = model;
         }
@@ -141,7 +145,7 @@ pub(super) fn materials(file: &SceneFile, said: &mut Vec<String>) -> Result<(Vec
             of_objects.push(known.2);
             continue;
         }
-        let mut material = Material { name: all[own].name.clone(), surface: file.materials[own].surface.clone() };
+        let mut material = Material { name: all[own].name.clone(), surface: surfaces[own].clone() };
         if let (Some(t), Some(asked)) = (&mut material.surface.inside, &all[own].surface.inside) {
             if let Some(other) = t.thickness.filter(|t| (f64::from(*t) / thickness - 1.0).abs() > SAME) {
                 said.push(format!(

@@ -50,34 +50,40 @@ pub(super) fn read(m: &Fields<'_>, key: &str) -> Result<Option<TextureEntry>> {
     }))
 }
 
-/// Refuses pictures under all keys but `but`.
-pub(super) fn refuse_elsewhere(m: &Fields<'_>, but: Option<&str>) -> Result<()> {
-    match m.keys().find(|key| m.is_table(key) && Some(*key) != but) {
-        Some(key) => {
-            Err(m.error_at(key, "is a table: pictures are for `albedo` of type = \"diffuse\" alone; give numbers"))
-        }
+/// Refuses pictures under all keys but these.
+pub(super) fn refuse_elsewhere(m: &Fields<'_>, places: &[&str]) -> Result<()> {
+    match m.keys().find(|key| m.is_table(key) && !places.contains(key)) {
+        Some(key) => Err(m.error_at(
+            key,
+            "is a table: pictures are for `albedo` of type = \"diffuse\", and `tint` or `colour` of type = \"translucent\"; give numbers",
+        )),
         None => Ok(()),
     }
 }
 
-/// Reads the pictures that are `typed`, those alike once.
-pub(super) fn load<'a>(
-    typed: impl Iterator<Item = Option<&'a TextureEntry>>,
-    folder: &Path,
-    said: &mut Vec<String>,
-) -> Result<Vec<Option<Arc<Texture>>>> {
-    let mut known: Vec<(TextureEntry, Arc<Texture>)> = Vec::new();
-    let one = |typed: Option<&TextureEntry>| {
-        let Some(typed) = typed else { return Ok(None) };
+/// Reads pictures, those alike once.
+pub(super) struct Loader<'a> {
+    folder: &'a Path,
+    said: &'a mut Vec<String>,
+    known: Vec<(TextureEntry, Arc<Texture>)>,
+}
+
+impl<'a> Loader<'a> {
+    /// Of those that are looked for in `folder`; what is odd about them goes to `said`.
+    pub(super) fn new(folder: &'a Path, said: &'a mut Vec<String>) -> Self {
+        Self { folder, said, known: Vec::new() }
+    }
+
+    /// The picture that is `typed`.
+    pub(super) fn load(&mut self, typed: &TextureEntry) -> Result<Arc<Texture>> {
         let alike = TextureEntry { at: String::new(), ..typed.clone() };
-        if let Some((_, texture)) = known.iter().find(|(other, _)| *other == alike) {
-            return Ok(Some(texture.clone()));
+        if let Some((_, texture)) = self.known.iter().find(|(other, _)| *other == alike) {
+            return Ok(texture.clone());
         }
-        let texture = Arc::new(typed.load(folder, said)?);
-        known.push((alike, texture.clone()));
-        Ok(Some(texture))
-    };
-    typed.map(one).collect()
+        let texture = Arc::new(typed.load(self.folder, self.said)?);
+        self.known.push((alike, texture.clone()));
+        Ok(texture)
+    }
 }
 
 impl TextureEntry {

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
-use crate::surface::{Boundary, Bsdf, Lambertian, RoughBoundary, Texture, Textured};
+use crate::surface::{Boundary, Bsdf, Lambertian, RoughBoundary, Texture, Textured, Tint};
 use std::sync::Arc;
 
 /// A scene whose numbers have been checked.
@@ -135,6 +135,12 @@ impl Surface {
         Self { bsdf: Arc::new(Boundary { eta: clear.eta }), emission: None, inside: None, clear: Some(clear) }
     }
 
+    /// The pictures on it, for which points need texture coordinates.
+    pub fn pictures(&self) -> impl Iterator<Item = &Arc<Texture>> {
+        let tint = self.inside.as_ref().and_then(|inside| inside.tint.as_ref()).filter(|tint| tint.is_picture());
+        self.bsdf.texture().into_iter().chain(tint.map(Tint::shares))
+    }
+
     /// What fills the body behind it; of translucent and clear bodies.
     pub fn medium(&self) -> Option<Medium> {
         let clear = |c: &Dielectric| Medium { sigma_a: c.sigma_a, sigma_s: Rgb::BLACK, g: 0.0, eta: c.eta };
@@ -182,6 +188,8 @@ pub struct Translucent {
     pub exit_normalisation: bool,
     /// Its boundary, if that is not smooth.
     pub rough: Option<Arc<RoughBoundary>>,
+    /// Pigment on its boundary.
+    pub tint: Option<Tint>,
     /// Where the numbers come from, for logs and headers.
     pub source: String,
 }
@@ -228,6 +236,12 @@ impl Scene {
 }
 
 impl Translucent {
+    /// Lays pigment on the boundary.
+    pub fn dye(&mut self, tint: Tint) {
+        self.source = format!("{}, {}", self.source, tint.text());
+        self.tint = Some(tint);
+    }
+
     /// The model asked for, of this medium.
     ///
     /// # Errors

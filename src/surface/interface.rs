@@ -2,22 +2,30 @@
 
 use super::microfacets::local;
 use super::rough_boundary::Side;
-use super::{Bsdf, BsdfSample, RoughBoundary};
+use super::{Bsdf, BsdfSample, RoughBoundary, Tint};
 use crate::geometry::SurfacePoint;
 use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::optics::{reflect, reflectance, refract, transmittance};
 use std::sync::Arc;
 
-/// A smooth or a rough boundary.
+/// A smooth or a rough boundary, with or without pigment.
 #[derive(Clone, Debug)]
 pub struct Interface {
     /// n_inside / n_outside.
     pub eta: f32,
     /// If it is not smooth.
     pub rough: Option<Arc<RoughBoundary>>,
+    /// Pigment on it.
+    pub tint: Option<Tint>,
 }
 
 impl Interface {
+    /// Share of what is let through at a point that passes its pigment, each channel in [0, 1].
+    #[inline]
+    pub fn tint(&self, at: &SurfacePoint) -> Rgb {
+        self.tint.as_ref().map_or(Rgb::WHITE, |tint| tint.at(at))
+    }
+
     /// Share in [0, 1] of light along a direction outside, of this cosine to the normal, that goes in; by reciprocity, what of even light inside leaves
     /// along it.
     #[inline]

@@ -62,6 +62,16 @@ impl Texture {
         ([index(below as i64), index(below as i64 + 1)], (place - below) as f32)
     }
 
+    /// Each texel made into another, in [0, 1].
+    pub fn map(&self, of: impl Fn(Rgb) -> Rgb) -> Self {
+        Self::new(self.name.clone(), self.width, self.texels.iter().map(|t| of(*t)).collect(), self.wrap)
+    }
+
+    /// The largest texel of each channel.
+    pub fn largest(&self) -> Rgb {
+        self.texels.iter().fold(Rgb::BLACK, |most, t| Rgb::from_fn(|c| most[c].max(t[c])))
+    }
+
     /// Mean of all texels.
     pub fn mean(&self) -> Rgb {
         self.mean

@@ -86,6 +86,7 @@ impl Body {
             thickness: None,
             calibrated: false,
             exit_normalisation: true,
+            tint: None,
             rough: None,
             source: String::new(),
         };

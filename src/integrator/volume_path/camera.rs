@@ -16,7 +16,7 @@ use crate::optics::{reflect, reflectance, refract, transmittance};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::scene::{Orders, Surface};
-use crate::surface::{Bsdf, RoughBoundary};
+use crate::surface::{Bsdf, RoughBoundary, Tint};
 use crate::tally::{Cause, Tally, WalkTally};
 
 /// A path that a surface with a mirror has left this weight goes on for certain.
@@ -160,7 +160,7 @@ impl<'a> CameraPath<'a> {
                 self.stepped = false;
                 if let Some(surface) = &self.method.stand_ins[hit.mesh as usize] {
                     self.left = None;
-                    return self.reflect(&at, -direction, surface);
+                    return self.reflect(&at, -direction, &**surface);
                 }
                 if self.method.modelled[hit.mesh as usize].is_some() {
                     self.left = None;
@@ -178,14 +178,17 @@ impl<'a> CameraPath<'a> {
                     self.turn(None);
                 }
                 if entry.body.matched {
-                    return self.inside(entry, &at, direction);
+                    return self.tinted(entry.body.tint.as_ref(), &at).then(|| self.inside(entry, &at, direction))?;
                 }
                 let flat = SurfacePoint { n: at.n_geometric, ..at };
                 if entry.body.rough.is_some() {
                     return self.meet_rough(entry, (&flat, -direction), true);
                 }
                 let w = entry.body.cross(&flat, -direction, &mut self.draws)?.wi;
-                if w.dot(at.n_geometric) < 0.0 { self.inside(entry, &at, w) } else { Some(Ray::new(at.leave(w), w)) }
+                if w.dot(at.n_geometric) > 0.0 {
+                    return Some(Ray::new(at.leave(w), w));
+                }
+                self.tinted(entry.body.tint.as_ref(), &at).then(|| self.inside(entry, &at, w))?
             }
         }
     }
@@ -253,10 +256,17 @@ impl<'a> CameraPath<'a> {
             }
             [false, false] => {
                 self.turn(None);
-                self.inside(entry, at, next.wi)
+                self.tinted(entry.body.tint.as_ref(), at).then(|| self.inside(entry, at, next.wi))?
             }
             _ => None,
         }
+    }
+
+    /// Through the pigment on a boundary; whether anything is left.
+    pub fn tinted(&mut self, tint: Option<&Tint>, at: &SurfacePoint) -> bool {
+        let Some(tint) = tint else { return true };
+        self.spectrum.scale(tint.at(at));
+        !self.spectrum.value_outside().is_black()
     }
 
     /// Through bodies from `at`, refracted into `w`; the ray on which the path leaves them.
@@ -284,6 +294,9 @@ impl<'a> CameraPath<'a> {
         (self.spectrum, self.draws) = (spectrum, draws);
         self.tally.walk += walks;
         let (body, exit) = left?;
+        if !self.tinted(body.tint.as_ref(), &exit.at) {
+            return None;
+        }
         // Behind a rough boundary lights have been asked for.
         if !body.matched && body.rough.is_none() {
             self.turn(None);
@@ -395,7 +408,8 @@ impl WalkObserver for Gather<'_, '_> {
         if path.order == 0 && path.method.modelled[body.object as usize].is_some() {
             return;
         }
-        path.ask_on((at, wo, rough), &Stack::default(), spectrum.value(&body.medium), |path| &mut path.coins);
+        let weight = spectrum.value(&body.medium) * body.tint(at);
+        path.ask_on((at, wo, rough), &Stack::default(), weight, |path| &mut path.coins);
     }
 
     fn turned(&mut self, turn: Turn<'_>) {
@@ -465,11 +479,14 @@ pub fn both_parts(path: &mut CameraPath<'_>, hit: &Hit, direction: Vec3) {
 pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, direction: Vec3) -> Option<Ray> {
     let body = entry.body;
     let at = path.view.point(hit, direction);
-    if body.matched {
-        return path.inside(entry, &at, direction);
-    }
     if body.rough.is_some() {
         return path.meet_rough(entry, (&at, -direction), false);
+    }
+    if !path.tinted(body.tint.as_ref(), &at) {
+        return None;
+    }
+    if body.matched {
+        return path.inside(entry, &at, direction);
     }
     let n = shading_normal(body, &at, direction);
     let passed = transmittance(body.eta, -n.dot(direction));

@@ -48,6 +48,20 @@ impl EmissionSampler {
         view: View<'_>,
         (body, table): (&Interior, &AreaTable),
         lights: &Lights,
+        numbers: (f64, &[f32; 7]),
+        tally: &mut Tally,
+    ) -> Option<Entering> {
+        let entering = self.untinted(view, (body, table), lights, numbers, tally)?;
+        let flux = entering.flux * body.tint(&entering.at);
+        (!flux.is_black()).then_some(Entering { flux, ..entering })
+    }
+
+    /// The same without the pigment of the boundary.
+    fn untinted(
+        &self,
+        view: View<'_>,
+        (body, table): (&Interior, &AreaTable),
+        lights: &Lights,
         (pick, u): (f64, &[f32; 7]),
         tally: &mut Tally,
     ) -> Option<Entering> {

@@ -59,7 +59,7 @@ impl VolumePath {
     pub(super) fn meets(&self, object: u32) -> Meets {
         let object = object as usize;
         match (&self.stand_ins[object], &self.modelled[object]) {
-            (Some(matt), _) => Meets::Opaque(Some(*matt)),
+            (Some(matt), _) => Meets::Opaque(Some(matt.clone())),
             (None, Some(_)) => Meets::Ends,
             (None, None) => Meets::Enters,
         }

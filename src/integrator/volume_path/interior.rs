@@ -10,7 +10,7 @@ use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium};
 use crate::query::{Hit, Ray};
 use crate::scene::{Contacts, Surface};
-use crate::surface::{Boundary, Bsdf, BsdfSample, RoughBoundary};
+use crate::surface::{Boundary, Bsdf, BsdfSample, RoughBoundary, Tint};
 use crate::tally::{Cause, WalkTally};
 use std::sync::Arc;
 
@@ -23,6 +23,8 @@ pub struct Interior {
     pub eta: f32,
     /// Its boundary, if that is not smooth.
     pub rough: Option<Arc<RoughBoundary>>,
+    /// Pigment on it. Whoever follows light in or out takes it into account: walks do not.
+    pub tint: Option<Tint>,
     /// The medium.
     pub medium: Coefficients,
     /// Where collisions send light.
@@ -176,6 +178,7 @@ impl Interior {
             object,
             eta: medium.eta,
             rough: None,
+            tint: None,
             patience: (0.1 / absorbed.max(1e-3)).clamp(1.0, 64.0) as u32,
             least_extinction: if least.is_finite() { least } else { 0.0 },
             medium: coefficients,
@@ -209,6 +212,12 @@ impl Interior {
     #[inline]
     pub fn flat(&self, at: SurfacePoint) -> SurfacePoint {
         if self.rough.is_some() { SurfacePoint { n: at.n_geometric, ..at } } else { at }
+    }
+
+    /// Share of light that is let through at a point which passes the pigment there.
+    #[inline]
+    pub fn tint(&self, at: &SurfacePoint) -> Rgb {
+        self.tint.as_ref().map_or(Rgb::WHITE, |tint| tint.at(at))
     }
 
     /// Which way light goes on that goes to `wo` from a point of the boundary, from either side.
@@ -318,7 +327,7 @@ impl Interior {
         }
     }
 
-    /// Follows light from `from`, inside, along `w` until it leaves; `None` where it is absorbed, ended by `watch`, or
+    /// Follows light from `from`, inside, along `w` until it leaves, but for the pigment on its way out; `None` where it is absorbed, ended by `watch`, or
     /// lost, which is counted with its cause.
     ///
     /// A path whose weight has fallen goes on with a chance in proportion to what is left, and is weighted by its

@@ -27,8 +27,8 @@ const MOST_CROSSED: u32 = 10_000;
 enum Step {
     /// What ends it.
     Blocked,
-    /// Something that it goes on behind, with this around it.
-    On(SurfacePoint, Option<Stack>),
+    /// Something that it goes on behind, with this around it, and this share of the light.
+    On(SurfacePoint, Option<Stack>, Rgb),
 }
 
 impl Lines<'_> {
@@ -42,6 +42,7 @@ impl Lines<'_> {
         let end = ray.t_max.is_finite().then(|| ray.origin + ray.direction.as_dvec3() * f64::from(ray.t_max));
         let w = ray.direction.normalize();
         let (mut ray, mut stack, mut last, mut depth) = (*ray, Cow::Borrowed(around), None, Rgb::BLACK);
+        let mut tint = Rgb::WHITE;
         for _ in 0..MOST_CROSSED {
             *rays += 1;
             let hit = self.view.rays.closest(&ray);
@@ -52,16 +53,17 @@ impl Lines<'_> {
                 }
                 depth += body.extinction().map(|s| s * length);
             }
-            let arrived = || depth.map(|d| (-d).exp());
-            let Some(hit) = hit else { return arrived() };
+            let arrived = |tint: Rgb| depth.map(|d| (-d).exp()) * tint;
+            let Some(hit) = hit else { return arrived(tint) };
             let on_it = last.replace((hit.mesh, hit.triangle)) == Some((hit.mesh, hit.triangle));
-            let Step::On(at, after) = self.step(&hit, &stack, w, on_it) else { return Rgb::BLACK };
+            let Step::On(at, after, passed) = self.step(&hit, &stack, w, on_it) else { return Rgb::BLACK };
+            tint = tint * passed;
             if let Some(after) = after {
                 stack = Cow::Owned(after);
             }
             let from = at.leave(w);
             ray = match end {
-                Some(end) if (end - from).dot(w.as_dvec3()) <= 0.0 => return arrived(),
+                Some(end) if (end - from).dot(w.as_dvec3()) <= 0.0 => return arrived(tint),
                 Some(end) => Ray::between(from, end),
                 None => Ray::new(from, w),
             };
@@ -78,7 +80,7 @@ impl Lines<'_> {
         let Some(body) = &self.bodies[hit.mesh as usize] else { return Step::Blocked };
         let at = self.view.outwards(hit);
         if on_it {
-            return Step::On(SurfacePoint { error: 2.0 * at.error, ..at }, None);
+            return Step::On(SurfacePoint { error: 2.0 * at.error, ..at }, None, Rgb::WHITE);
         }
         let faces = faces(self.view, stack, body, hit, &at, w);
         let Some(after) = stack.crossed(&faces.turns, self.view.scene.nests()) else { return Step::Blocked };
@@ -86,6 +88,8 @@ impl Lines<'_> {
         if after.top() != stack.top() && !(straight(stack) && straight(&after)) {
             return Step::Blocked;
         }
-        Step::On(SurfacePoint { error: at.error.max(faces.margin), ..at }, Some(after))
+        // Only a body that stands alone has any.
+        let tint = body.tint(&at);
+        Step::On(SurfacePoint { error: at.error.max(faces.margin), ..at }, Some(after), tint)
     }
 }

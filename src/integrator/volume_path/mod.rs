@@ -36,7 +36,7 @@ use crate::optics::Medium;
 use crate::query::Hit;
 use crate::sampling::PixelStream;
 use crate::scene::{Contacts, Obstacle, ObstacleKind, Orders, Scene, Surface, default_photons};
-use crate::surface::Lambertian;
+use crate::surface::Bsdf;
 use crate::tally::{Cause, Tally};
 use crate::words::short;
 use camera::{CameraPath, both_parts, enter};
@@ -51,6 +51,7 @@ use nesting::{Entry, Stack};
 pub use pencil::Left;
 use photons::Source;
 use spectrum::Spectrum;
+use std::sync::Arc;
 use through::RefractedNee;
 pub(super) use windows::{Out, Windows};
 
@@ -94,7 +95,7 @@ pub struct VolumePath {
     /// One for each object; for bodies whose light a model has.
     modelled: Vec<Option<Modelled>>,
     /// One for each object; what stands for the surface of a body that paths do not enter.
-    stand_ins: Vec<Option<Lambertian>>,
+    stand_ins: Vec<Option<Arc<dyn Bsdf>>>,
     /// Surfaces over which a path goes on, at most.
     bounces: u32,
 }
@@ -133,13 +134,17 @@ impl VolumePath {
         if !refusals.is_empty() {
             return Err(Error::scene(refusals.join("\n")));
         }
-        let rough = |i: usize| scene.surface(i as u32).inside.as_ref().is_some_and(|inside| inside.rough.is_some());
-        if let Some(i) = (0..scene.objects.len()).find(|&i| rough(i) && scene.nests().meets[i]) {
-            return Err(Error::scene(format!(
-                "the boundary of `{}` is rough and meets another body: `volume_path` knows rough boundaries of bodies that stand alone; move \
-                 them apart, or take `roughness = 0`",
-                scene.objects[i].name
-            )));
+        for (i, object) in scene.objects.iter().enumerate().filter(|(i, _)| scene.nests().meets[*i]) {
+            let Some(inside) = &scene.surface(i as u32).inside else { continue };
+            let kinds =
+                [(inside.rough.is_some(), "rough", "roughness = 0"), (inside.tint.is_some(), "tinted", "no `tint`")];
+            if let Some((_, kind, without)) = kinds.into_iter().find(|(is, ..)| *is) {
+                return Err(Error::scene(format!(
+                    "the boundary of `{}` is {kind} and meets another body: `volume_path` knows {kind} boundaries of bodies that stand alone; \
+                     move them apart, or take {without}",
+                    object.name
+                )));
+            }
         }
         let lights = Lights::new(scene);
         let bodies: Vec<Option<Interior>> =
@@ -358,8 +363,9 @@ fn interior(scene: &Scene, index: usize, cells: u32) -> Option<Interior> {
     });
     let leak = leak.unwrap_or(Cause::Rounding);
     let (nests, contacts) = (scene.nests(), scene.nests().contacts[index].clone());
-    let rough = scene.surface(body.object).inside.as_ref().and_then(|inside| inside.rough.clone());
-    Some(Interior { leak, rough, nested: clear.is_some() || nests.meets[index], contacts, ..interior })
+    let inside = scene.surface(body.object).inside.as_ref();
+    let (rough, tint) = (inside.and_then(|t| t.rough.clone()), inside.and_then(|t| t.tint.clone()));
+    Some(Interior { leak, rough, tint, nested: clear.is_some() || nests.meets[index], contacts, ..interior })
 }
 
 /// With lines through its boundary where that does not refract.

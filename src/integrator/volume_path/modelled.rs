@@ -19,7 +19,7 @@ use crate::optics::{Medium, reflect};
 use crate::query::{Hit, Ray};
 use crate::sampling::{PixelStream, cosine_hemisphere};
 use crate::scene::{Orders, Scene};
-use crate::surface::{Bsdf as _, Interface, Lambertian, RoughReflection};
+use crate::surface::{Bsdf, Interface, RoughReflection};
 use crate::tally::Tally;
 use std::f32::consts::PI;
 use std::sync::Arc;
@@ -110,7 +110,7 @@ impl VolumePath {
     /// Paths over opaque surfaces and through clear bodies; `stand_ins` are the surfaces of bodies that scatter, without them paths end there.
     pub(in super::super) fn over_surfaces(
         scene: &Scene,
-        stand_ins: Vec<Option<Lambertian>>,
+        stand_ins: Vec<Option<Arc<dyn Bsdf>>>,
         bounces: u32,
         seed: u64,
     ) -> Self {
@@ -179,7 +179,7 @@ impl VolumePath {
         let most = u32::from(self.modelled[object as usize].as_ref()?.once);
         let mut spectrum = Spectrum::new(flux, draws.number());
         let exit = body.walk(view, from, &mut spectrum, draws, &mut AtMost(most), &mut tally.walk)?;
-        Some((Ray::new(exit.at.leave(exit.w), exit.w), spectrum.value_outside()))
+        Some((Ray::new(exit.at.leave(exit.w), exit.w), spectrum.value_outside() * body.tint(&exit.at)))
     }
 
     /// The body of object number `object`, where paths walk in it.
@@ -194,9 +194,9 @@ impl CameraPath<'_> {
         let Some(model) = &self.method.modelled[hit.mesh as usize] else { return };
         let at = self.view.point(hit, direction);
         let n = at.normal_seen_from(-direction);
-        let passed = model.boundary.passed(-n.dot(direction));
+        let passed = model.boundary.tint(&at) * model.boundary.passed(-n.dot(direction));
         let (object, w, stream) = (hit.mesh, -direction, self.stream);
-        self.scratch.asked.push(Asked { object, at, w, weight: Rgb::splat(passed), stream, later: false });
+        self.scratch.asked.push(Asked { object, at, w, weight: passed, stream, later: false });
         let (spectrum, draws) = (self.spectrum, self.draws.clone());
         if self.method.options.specular {
             self.draws = draws.fork(1);
@@ -205,9 +205,12 @@ impl CameraPath<'_> {
                 self.trace(ray);
             }
         }
+        if passed.is_black() {
+            return;
+        }
         if let Some(plan) = &model.near {
             (self.spectrum, self.draws, self.sight) = (spectrum, draws.fork(2), None);
-            self.spectrum.scale(Rgb::splat(passed));
+            self.spectrum.scale(passed);
             if let Some(ray) = self.step(plan, &at, w) {
                 self.trace(ray);
             }
@@ -216,7 +219,7 @@ impl CameraPath<'_> {
         let Some(body) = self.method.body(hit.mesh) else { return };
         if model.clear {
             (self.spectrum, self.draws, self.sight) = (spectrum, draws.fork(3), None);
-            self.spectrum.scale(Rgb::splat(passed));
+            self.spectrum.scale(passed);
             let inside = self.enters(&model.boundary, n, w);
             if let Some(ray) = inside.and_then(|inside| self.straight(body, &at, inside)) {
                 self.trace(ray);
@@ -258,6 +261,9 @@ impl CameraPath<'_> {
             self.spectrum.scale(Rgb::splat(1.0 - mirrored));
         } else if self.draws.number() < mirrored {
             return self.mirrored(&model.boundary, &flat, w, 1.0);
+        }
+        if !self.tinted(model.boundary.tint.as_ref(), at) {
+            return None;
         }
         self.ask(hit, at, w);
         let body = self.method.body(hit.mesh);
@@ -334,12 +340,16 @@ impl CameraPath<'_> {
             let at = body.flat(at);
             if let Some(rough) = &body.rough {
                 let weight = self.spectrum.value_outside();
+                let weight = weight * body.tint(&at);
                 self.ask_on((&at, -w, &**rough), &Stack::default(), weight, |path| &mut path.draws);
             }
             let next = body.cross(&at, -w, &mut self.draws)?;
             self.spectrum.scale(next.weight);
             from = at.leave(next.wi);
             if next.wi.dot(at.n_geometric) > 0.0 {
+                if !self.tinted(body.tint.as_ref(), &at) {
+                    return None;
+                }
                 if body.rough.is_some() {
                     self.turn(Some((next.pdf, Reference::surface(&at))));
                 }

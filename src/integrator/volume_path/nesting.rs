@@ -18,8 +18,9 @@ use crate::integrator::View;
 use crate::math::{DVec3, Vec3};
 use crate::query::{Hit, Ray};
 use crate::scene::Nests;
-use crate::surface::{Boundary, Bsdf, Lambertian};
+use crate::surface::{Boundary, Bsdf};
 use crate::tally::{Cause, WalkTally};
+use std::sync::Arc;
 
 /// The bodies around a place, from the weakest to the strongest, each with the number of times.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -178,7 +179,7 @@ pub enum Meets {
     /// They enter it.
     Enters,
     /// As an opaque surface: what stands for a body, or else the surface itself.
-    Opaque(Option<Lambertian>),
+    Opaque(Option<Arc<dyn Bsdf>>),
     /// They end, and are counted.
     Ends,
 }
@@ -285,7 +286,7 @@ pub fn walk<'a>(
             }
             Meets::Opaque(stand_in) => {
                 let at = at.facing(-w);
-                let bsdf: &dyn Bsdf = stand_in.as_ref().map_or(&*surface.bsdf, |matt| matt);
+                let bsdf: &dyn Bsdf = stand_in.as_deref().unwrap_or(&*surface.bsdf);
                 let watch = &mut guide.watch(body, &stack, false);
                 w = reflected((&at, w), bsdf, (&body.medium, spectrum), draws, watch)?;
                 (from, phase) = (at.leave(w), None);

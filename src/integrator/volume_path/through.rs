@@ -229,7 +229,7 @@ fn passed(
     if !body.lets_through(view, Ray::between(x, at.arrive(crossing.inside, x, 0.0))) {
         return Rgb::BLACK;
     }
-    lines.passed(&drawn.shadow(&at, crossing.outside), &Stack::default(), &mut tally.rays)
+    body.tint(&at) * lines.passed(&drawn.shadow(&at, crossing.outside), &Stack::default(), &mut tally.rays)
 }
 
 /// The share of the radiance of the lamp at `hit`, met along `direction` by a path that came out of a body straight from
