@@ -379,12 +379,12 @@ fn picture() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         std::fs::write(&path, seed).unwrap();
-        FilePicture::read_texture(&path, None).unwrap();
+        FilePicture::read_texture(&path, None, false).unwrap();
     }
     fuzz("picture", &seeds, |bytes, folder| {
         let path = folder.join("a");
         std::fs::write(&path, with_checksums(bytes.to_vec())).unwrap();
-        FilePicture::read_texture(&path, None).is_ok()
+        FilePicture::read_texture(&path, None, false).is_ok()
     });
 }
 

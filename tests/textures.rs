@@ -218,7 +218,7 @@ fn codes_are_srgb_and_floats_linear() {
     save_png(&at("rgb.png"), [2, 1], png::ColorType::Rgb, &[128, 0, 255, 1, 2, 3]);
     save_png(&at("grey.png"), [1, 1], png::ColorType::Grayscale, &[128]);
     save_png(&at("alpha.png"), [1, 1], png::ColorType::Rgba, &[128, 64, 32, 7]);
-    let read = |name: &str| FilePicture::read_texture(&at(name), None).unwrap();
+    let read = |name: &str| FilePicture::read_texture(&at(name), None, false).unwrap();
     let near = |found: Rgb, right: [f32; 3]| {
         assert!((0..3).all(|c| (found[c] - right[c]).abs() < 1e-5), "{found:?} for {right:?}");
     };
@@ -312,7 +312,7 @@ fn nothing_is_kept_that_nobody_needs() {
     let scene = load_in(folder.path(), &text);
     let has: Vec<bool> = scene.objects.iter().map(|o| o.mesh.uv.is_some()).collect();
     assert_eq!(has, [true, false, true, false, true, false]);
-    let texture = |object: u32| scene.surface(object).bsdf.texture().unwrap();
+    let texture = |object: u32| scene.surface(object).pictures().next().unwrap();
     assert!(std::ptr::eq(&**texture(0), &**texture(2)) && !std::ptr::eq(&**texture(0), &**texture(4)));
     assert_eq!(texture(0).resolution(), [32, 32]);
 }
@@ -414,7 +414,7 @@ fn what_is_refused_says_why() {
         (
             good.replace("sigma_s_prime = 1", "sigma_s_prime = { image = \"a.exr\" }"),
             scene,
-            &["`material.wax.sigma_s_prime` is a table", "`albedo` of type = \"diffuse\" alone"],
+            &["`material.wax.sigma_s_prime` is a table", "pictures are for `albedo`"],
         ),
     ];
     for (text, kind, parts) in cases {

@@ -1,4 +1,4 @@
-//! Makes the meshes of the demo scenes, the same bytes on every run:
+//! Makes the meshes and pictures of the demo scenes, the same bytes on every run:
 //!
 //!     cargo run --release --example make_scenes [-- OUT_DIR [--cell MM]]
 //!
@@ -9,6 +9,7 @@
 mod candles;
 mod cornell;
 mod improve;
+mod leaf;
 mod lotus;
 mod mesh;
 mod openwork;
@@ -28,6 +29,9 @@ use mesh::Mesh;
 const CELL: f64 = 0.82;
 /// The lotus in the repository has at least so many triangles.
 const LEAST_TRIANGLES: usize = 50_000;
+
+/// The picture on the leaf.
+const LEAF: &str = "leaf/leaf.png";
 
 /// A mesh and the file it goes to.
 struct Part {
@@ -56,6 +60,8 @@ fn parts(cell: f64) -> Vec<Part> {
         solid("candles/middle.obj", "a candle of middle height", candles::candle(1)),
         solid("candles/low.obj", "a low candle", candles::candle(2)),
         solid("jade/ball.obj", "an openwork ball", polygonise::polygonise(&openwork::Openwork, 2.0 * cell)),
+        open("leaf/leaf.obj", "a leaf: the middle of a sheet", leaf::leaf()),
+        solid("leaf/twig.obj", "a twig", leaf::twig()),
         solid("jade/stand.obj", "a ring to stand a ball on", openwork::stand()),
     ]
 }
@@ -103,7 +109,15 @@ fn run() -> Result<(), String> {
         }
         write(&out, &part)?;
     }
-    Ok(())
+    let path = out.join(LEAF);
+    write_png(&path, &leaf::picture()).map_err(|e| format!("cannot write {}: {e}", path.display()))
+}
+
+fn write_png(path: &Path, ([width, height], codes): &leaf::Picture) -> Result<(), Box<dyn std::error::Error>> {
+    let mut encoder = png::Encoder::new(std::fs::File::create(path)?, *width, *height);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_compression(png::Compression::High);
+    Ok(encoder.write_header()?.write_image_data(codes)?)
 }
 
 fn main() -> ExitCode {

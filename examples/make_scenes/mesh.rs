@@ -1,4 +1,4 @@
-//! A closed triangle mesh, what it must satisfy, and its OBJ text.
+//! A triangle mesh, what a closed one must satisfy, and its OBJ text.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -16,6 +16,8 @@ pub struct Mesh {
     pub normals: Vec<DVec3>,
     /// Three indices into `normals` each, in the order of `triangles`; empty without normals.
     pub normal_triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of each vertex; empty without any.
+    pub uv: Vec<[f64; 2]>,
 }
 
 /// What a check of a mesh counted.
@@ -206,11 +208,15 @@ impl Mesh {
             let _ = writeln!(text, "{key} {x} {y} {z}"); // writing to a String cannot fail
         };
         self.positions.iter().for_each(|p| line(&mut text, "v", *p));
+        self.uv.iter().for_each(|[u, v]| {
+            let _ = writeln!(text, "vt {u:.5} {v:.5}");
+        });
         self.normals.iter().for_each(|n| line(&mut text, "vn", *n));
         for (k, t) in self.triangles.iter().enumerate() {
             let [a, b, c] = t.map(|i| i + 1);
             let _ = match self.normal_triangles.get(k) {
                 Some(n) => writeln!(text, "f {a}//{} {b}//{} {c}//{}", n[0] + 1, n[1] + 1, n[2] + 1),
+                None if !self.uv.is_empty() => writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}"),
                 None => writeln!(text, "f {a} {b} {c}"),
             };
         }

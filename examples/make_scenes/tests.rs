@@ -9,7 +9,7 @@ use marmor::math::{DVec2, DVec3};
 use crate::mesh::Mesh;
 use crate::polygonise::{Field, polygonise};
 use crate::shapes::cuboid;
-use crate::{CELL, LEAST_TRIANGLES, describe, parts};
+use crate::{CELL, LEAF, LEAST_TRIANGLES, describe, leaf, parts};
 
 /// A torus around the y axis: radii 10 and 4 mm.
 struct Torus;
@@ -89,4 +89,10 @@ fn the_repository_holds_what_the_generator_makes() {
             assert!(part.mesh.triangles.len() >= LEAST_TRIANGLES);
         }
     }
+    let file = std::io::BufReader::new(std::fs::File::open(scenes.join(LEAF)).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut stored = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut stored).unwrap();
+    let far = stored.iter().zip(&leaf::picture().1).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+    assert_eq!(far, 0, "{LEAF}: run `cargo run --example make_scenes`");
 }

@@ -10,7 +10,6 @@ use marmor::geometry::{Mended, load_obj_with_uv, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
 use marmor::math::Rgb;
 use marmor::optics::{ChannelOptics, HalfSpace, Medium};
-use marmor::query;
 use marmor::scene::{Emission, FilterName, Geometry, Object, Projection, Scene, SceneFile, Surface, Translucent};
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
@@ -44,8 +43,8 @@ pub fn run(args: Args) -> Result<ExitCode> {
     let parts = prepared.method.parts(scene);
     let [width, height] = scene.camera.resolution;
     let available = marmor::memory::available();
-    let (meshes, window) = (scene.meshes(), Window::full([width, height]));
-    let rays = query::build(prepared.backend, &meshes)?;
+    let window = Window::full([width, height]);
+    let rays = scene.rays(prepared.backend)?;
     let view = View { scene, rays: &*rays };
     let need = need::of(&prepared, window, Some(view));
     let advice = Advice::new(&prepared, view, window, usize::MAX, args.tolerance);

@@ -151,12 +151,14 @@ fn identity(prepared: &Prepared, backend: &str, window: Window) -> Identity {
         let what = format!("{}, {width}x{height} pixels, hash {:016x}", name.display(), image.fingerprint());
         facts.push(("picture of the environment".into(), what));
     }
-    facts.extend(scene.materials.iter().filter_map(|material| {
-        let texture = material.surface.pictures().next()?;
-        let [width, height] = texture.resolution();
-        let what = format!("{}, {width}x{height} pixels, hash {:016x}", texture.name(), texture.fingerprint());
-        Some((format!("picture of material {}", material.name), what))
-    }));
+    for material in &scene.materials {
+        for (number, texture) in material.surface.pictures().enumerate() {
+            let [width, height] = texture.resolution();
+            let what = format!("{}, {width}x{height} pixels, hash {:016x}", texture.name(), texture.fingerprint());
+            let which = if number > 0 { format!("picture {} of", number + 1) } else { "picture of".into() };
+            facts.push((format!("{which} material {}", material.name), what));
+        }
+    }
     facts.push(("centre of the scene".into(), scene.centre.to_string()));
     Identity(facts)
 }

@@ -9,7 +9,7 @@ use marmor::film::{
     Checkpoint, Film, Format, Image, SelfError, Truth, Window, check_replaceable, judge, write_atomically,
 };
 use marmor::integrator::{Integrator as _, View, lost};
-use marmor::query::{self, RayQuery};
+use marmor::query::RayQuery;
 use marmor::render::{self, Job, Seconds, odd_counts};
 use marmor::report::ErrorPoint;
 use marmor::tally::Tally;
@@ -206,7 +206,7 @@ impl<'a> Runner<'a> {
     pub fn new(entrant: &'a Entrant) -> Result<Self> {
         let begin = Instant::now();
         let scene = &entrant.prepared.scene;
-        let rays = query::build(entrant.prepared.backend, &scene.meshes())?;
+        let rays = scene.rays(entrant.prepared.backend)?;
         let resolution = scene.camera.resolution;
         Ok(Self {
             film: Film::new(resolution, Window::full(resolution))?,

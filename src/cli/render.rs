@@ -13,7 +13,6 @@ use super::stats::{self, Stats};
 use super::{read_picture, replay, threads};
 use marmor::film::{Film, Format, Image, Window, check_replaceable, check_writable};
 use marmor::integrator::{Integrator as _, View, lost};
-use marmor::query;
 use marmor::render::{self, Job, Observer, Options, Outcome, Spent, Stop, no_light};
 use marmor::report::RecordFile;
 use marmor::scene::{Scene, SceneFile};
@@ -123,8 +122,7 @@ pub fn run(args: Args) -> Result<ExitCode> {
                 eprintln!("warning: {warning}");
             }
         }
-        let meshes: Vec<_> = scene.objects.iter().map(|o| &o.mesh).collect();
-        let rays = query::build(prepared.backend, &meshes)?;
+        let rays = scene.rays(prepared.backend)?;
         let view = View { scene, rays: &*rays };
         let cancel = cancel_on_signals();
         let job = Job { seed: prepared.seed, passes, time: args.time, cancel: &cancel };

@@ -21,11 +21,11 @@ impl FilePicture {
     }
 
     /// Reads a picture that is laid on a surface: PNG or JPEG, taken as sRGB and decoded to linear Rec. 709, alpha ignored; or
-    /// what [`FilePicture::read`] reads, which is linear.
+    /// what [`FilePicture::read`] reads, which is linear. With `is_data` codes of PNG and JPEG are shares of the largest one, and no colours.
     ///
     /// # Errors
     /// As [`FilePicture::read`]; File for a JPEG in inks (CMYK).
-    pub fn read_texture(path: &Path, layer: Option<&str>) -> Result<Self> {
+    pub fn read_texture(path: &Path, layer: Option<&str>, is_data: bool) -> Result<Self> {
         let png = match exr_read::first_bytes(path)?[..] {
             [0x89, b'P', b'N', b'G'] => true,
             [0xff, 0xd8, ..] => false,
@@ -37,7 +37,7 @@ impl FilePicture {
             }
         };
         match layer {
-            None => srgb_read::read(path, png),
+            None => srgb_read::read(path, png, is_data),
             Some(layer) => {
                 let kind = if png { "PNG" } else { "JPEG" };
                 Err(Error::file(path, "read", format!("it is a {kind} file, which has no layers, nor `{layer}`")))

@@ -26,7 +26,8 @@ struct Codes {
 }
 
 /// See [`FilePicture::read_texture`].
-pub(super) fn read(path: &Path, png: bool) -> Result<FilePicture> {
+pub(super) fn read(path: &Path, png: bool, is_data: bool) -> Result<FilePicture> {
+    let linear = |code: f64| if is_data { code } else { linear(code) };
     let bytes = input::read_all(path, 1)?;
     let codes = if png { read_png(path, &bytes) } else { read_jpeg(path, &bytes) }?;
     let table: Vec<f32> = (0..256).map(|code| linear(f64::from(code) / 255.0) as f32).collect();

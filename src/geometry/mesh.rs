@@ -152,6 +152,17 @@ impl Mesh {
         std::array::from_fn(|k| a[k] * (1.0 - u - v) + b[k] * u + c[k] * v)
     }
 
+    /// Derivatives of a triangle's points by their texture coordinates \[unit\]; `None` where these do not span it.
+    pub fn tangents(&self, triangle: u32) -> Option<[Vec3; 2]> {
+        let [a, b, c] = self.corners(triangle);
+        let [s, t, r] = self.uv.as_ref()?[triangle as usize].map(|uv| uv.map(f64::from));
+        let ([u1, v1], [u2, v2]) = ([t[0] - s[0], t[1] - s[1]], [r[0] - s[0], r[1] - s[1]]);
+        let determinant = u1 * v2 - u2 * v1;
+        let along = |p: f64, q: f64| (((b - a) * p - (c - a) * q) * (1.0 / determinant)).as_vec3();
+        let tangents = [along(v2, v1), along(-u2, -u1)];
+        (determinant != 0.0 && tangents.iter().all(|t| t.is_finite())).then_some(tangents)
+    }
+
     /// Memory of vertices, triangles, normals and texture coordinates.
     pub fn bytes(&self) -> usize {
         let normals = self.normals.as_ref().map_or(0, |n| size_of_val(&*n.vectors) + size_of_val(&*n.triangles));

@@ -40,7 +40,7 @@ pub(super) fn stand_ins(scene: &Scene) -> Result<Vec<Option<Arc<dyn Bsdf>>>> {
         let albedo =
             inside.tint.as_ref().map(|tint| Arc::new(tint.shares().map(|t| total.map(|v| v.min(1.0)) * t * t)));
         let stand_in: Arc<dyn Bsdf> = match albedo {
-            Some(albedo) => Arc::new(Textured { albedo }),
+            Some(albedo) => Arc::new(Textured { albedo, roughness: 0.0 }),
             None => Arc::new(Lambertian { albedo: total }),
         };
         Ok(Some(stand_in))

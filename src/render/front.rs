@@ -6,7 +6,6 @@ use crate::bssrdf::ModelName;
 use crate::error::{Error, Result};
 use crate::film::{Film, Image, Window, variance};
 use crate::integrator::{View, lost};
-use crate::query;
 use crate::scene::{Estimator, Material, MethodName, Object, Scene, SceneFile, Shape, Translucent};
 use crate::words::counted;
 use std::sync::atomic::AtomicBool;
@@ -83,7 +82,7 @@ pub fn render(scene: &SceneFile, options: &Options) -> Result<Rendered> {
     // Refuses what will not fit before meshes are read, which may take long.
     let mut film = Film::new(resolution, options.window.unwrap_or(Window::full(resolution)))?;
     let prepared = Prepared::new(scene.clone(), options)?;
-    let rays = query::build(prepared.backend, &prepared.scene.meshes())?;
+    let rays = prepared.scene.rays(prepared.backend)?;
     let view = View { scene: &prepared.scene, rays: &*rays };
     let job = Job { seed: prepared.seed, passes, time: options.time, cancel: &AtomicBool::new(false) };
     let outcome = run(&prepared.method, view, &job, &mut film, &mut [])?;

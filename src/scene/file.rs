@@ -122,9 +122,8 @@ impl SceneFile {
             _ => None,
         });
         let sky = self.environment.image.iter().map(|path| ("the picture of [environment]".to_string(), path));
-        let pictures = self.materials.iter().filter_map(|material| {
-            let picture = material.picture.as_ref()?;
-            Some((format!("the picture of material {:?}", material.name), &picture.image.image))
+        let pictures = self.materials.iter().flat_map(|material| {
+            material.images().map(|entry| (format!("the picture of material {:?}", material.name), &entry.image))
         });
         let all = meshes.chain(sky).chain(pictures).map(|(what, path)| (what, folder.join(path)));
         all.filter(|(_, path)| seen.insert(path.clone())).collect()

@@ -183,7 +183,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
         Geometry::Mesh(path) => Some(folder.join(path)),
         _ => None,
     };
-    let has_picture = |entry: &ObjectEntry| file.materials[entry.material].picture.is_some();
+    let has_picture = |entry: &ObjectEntry| file.materials[entry.material].images().next().is_some();
     let with_uv: HashSet<PathBuf> =
         file.objects.iter().filter(|entry| has_picture(entry)).filter_map(path_of).collect();
     let mut uses: HashMap<PathBuf, usize> = HashMap::new();
@@ -235,7 +235,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
 /// Refuses an object that has a picture and no coordinates for it.
 fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> {
     let (material, all) = (&file.materials[entry.material], mesh.triangles.len());
-    let without = if material.picture.is_some() { mesh.without_uv() } else { 0 };
+    let without = if material.images().next().is_some() { mesh.without_uv() } else { 0 };
     if without == 0 {
         return Ok(());
     }

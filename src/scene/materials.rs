@@ -1,14 +1,15 @@
 //! `[material.NAME]` as typed.
 
+use super::opaque::OpaqueEntry;
 use super::textures::Loader;
 use super::tree::{Fields, Node};
 use super::values::{self, RADIANCE, UNIT, colour, named_value, rgb, switch, unit, unknown};
-use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, opaque, textures};
+use super::{Dielectric, Emission, Surface, TextureEntry, Translucent, textures};
 use crate::bssrdf::ModelName;
 use crate::error::{Error, Result};
 use crate::math::Rgb;
 use crate::optics::{Look, Medium, Preset};
-use crate::surface::{Bsdf as _, RoughBoundary, Tint};
+use crate::surface::{Bsdf as _, Relief, RoughBoundary, Texture, Tint};
 use std::sync::Arc;
 
 /// One material, its coefficients already per scene unit.
@@ -18,31 +19,45 @@ pub struct MaterialEntry {
     pub name: String,
     /// The kind and its numbers.
     pub surface: Surface,
-    /// Its picture, if it has one; until that is read [`Self::surface`] has something in its place.
-    pub picture: Option<Picture>,
+    /// Its pictures; until they are read [`Self::surface`] has something in their place.
+    pub(super) pictures: Pictures,
     /// File and line, for messages.
     pub at: String,
     /// What is wrong with it unless each of its objects has a `thickness`.
     pub(super) without_thickness: Option<String>,
 }
 
-/// A picture, and what it says.
-#[derive(Clone, Debug)]
-pub struct Picture {
-    /// The picture.
-    pub image: TextureEntry,
-    of: Of,
+/// Pictures as typed.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Pictures {
+    opaque: Option<OpaqueEntry>,
+    /// Tint of a boundary.
+    tint: Option<TextureEntry>,
+    /// Colour of a translucent body, the rest of whose look, and factor of whose coefficients, are these.
+    colour: Option<(TextureEntry, Look, f64)>,
+    /// A normal map and its strength.
+    normal: Option<(TextureEntry, f32)>,
+    /// A height map and its height.
+    bump: Option<(TextureEntry, f32)>,
+    /// What is there of an opaque surface.
+    opacity: Option<TextureEntry>,
 }
 
-/// What a picture says.
-#[derive(Clone, Debug)]
-enum Of {
-    /// Albedo of a diffuse surface.
-    Albedo,
-    /// Tint of a boundary.
-    Tint,
-    /// Colour of a translucent body, the rest of whose look, and factor of whose coefficients, are these.
-    Colour(Look, f64),
+impl Pictures {
+    /// Those that stand beside colours.
+    fn read(m: &Fields<'_>, opaque: Option<OpaqueEntry>) -> Result<Self> {
+        let normal = textures::read_data(m, "normal", Some("strength"))?;
+        let bump = textures::read_data(m, "bump", Some("height"))?;
+        if bump.as_ref().is_some_and(|(_, height)| height.is_none()) {
+            return Err(m.error_at("bump", "has no `height`: how high the picture's 1 is, in units"));
+        }
+        if normal.is_some() && bump.is_some() {
+            return Err(m.error_at("bump", "stands beside `normal`; remove one of them"));
+        }
+        let opacity = textures::read_data(m, "opacity", None)?.map(|(image, _)| image);
+        let with = |default: f64| move |(image, v): (TextureEntry, Option<f64>)| (image, v.unwrap_or(default) as f32);
+        Ok(Self { opaque, normal: normal.map(with(1.0)), bump: bump.map(with(0.0)), opacity, ..Self::default() })
+    }
 }
 
 const KINDS: &[&str] = &["translucent", "dielectric", "diffuse", "plastic", "conductor", "emissive"];
@@ -60,21 +75,20 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             "\"translucent\", \"dielectric\", \"diffuse\", \"plastic\", \"conductor\" or \"emissive\"",
             Node::text,
         )?;
-        let (mut without_thickness, mut picture) = (None, None);
+        let mut without_thickness = None;
         let places: &[&str] = match kind {
-            "diffuse" => &["albedo"],
-            "translucent" => &["tint", "colour"],
+            "diffuse" | "plastic" => &["albedo", "roughness", "normal", "bump", "opacity"],
+            "conductor" => &["roughness", "normal", "bump", "opacity"],
+            "translucent" => &["tint", "colour", "normal", "bump"],
             _ => &[],
         };
         textures::refuse_elsewhere(&m, places)?;
+        let opaque = OpaqueEntry::read(&m, kind)?;
+        let plain = opaque.as_ref().map(OpaqueEntry::plain);
+        let mut pictures = Pictures::read(&m, opaque)?;
         let surface = match kind {
-            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), (&mut without_thickness, &mut picture))?,
-            "diffuse" => {
-                picture = textures::read(&m, "albedo")?.map(|image| Picture { image, of: Of::Albedo });
-                opaque::diffuse(&m, picture.is_some())?
-            }
-            "conductor" => opaque::conductor(&m)?,
-            "plastic" => opaque::plastic(&m)?,
+            _ if plain.is_some() => plain.map(Surface::opaque).unwrap_or_else(|| Surface::diffuse(Rgb::BLACK)),
+            "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), (&mut without_thickness, &mut pictures))?,
             "emissive" => {
                 m.only("an emissive material", &["type", "radiance", "two_sided"])?;
                 let radiance = m.need("radiance", RADIANCE, |n| colour(n, |v| v >= 0.0))?;
@@ -88,54 +102,73 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
             }
             other => return Err(m.error_at("type", unknown(other, KINDS))),
         };
-        Ok(MaterialEntry { name: name.to_string(), surface, picture, at: m.at(), without_thickness })
+        Ok(MaterialEntry { name: name.to_string(), surface, pictures, at: m.at(), without_thickness })
     });
     entries.collect()
 }
 
 impl MaterialEntry {
-    /// The surface with its picture.
+    /// The pictures on it.
+    pub fn images(&self) -> impl Iterator<Item = &TextureEntry> {
+        let Pictures { opaque, tint, colour, normal, bump, opacity } = &self.pictures;
+        let relief = normal.iter().chain(bump).map(|(image, _)| image);
+        let inside = tint.iter().chain(colour.iter().map(|(image, ..)| image));
+        opaque.iter().flat_map(OpaqueEntry::images).chain(inside).chain(relief).chain(opacity)
+    }
+
+    /// The surface with its pictures.
     ///
     /// # Errors
     /// A picture that cannot be read, or that is no colour of a body.
     pub(super) fn pictured(&self, loader: &mut Loader<'_>) -> Result<Surface> {
-        let Some(Picture { image, of }) = &self.picture else { return Ok(self.surface.clone()) };
-        let texture = loader.load(image)?;
-        let with = |change: &dyn Fn(&mut Translucent)| {
-            let mut inside = self.surface.inside.clone();
-            inside.iter_mut().for_each(change);
-            Surface { inside, ..self.surface.clone() }
-        };
-        Ok(match of {
-            Of::Albedo => Surface::textured(texture),
-            Of::Tint => with(&|t| t.dye(Tint::picture(texture.clone()))),
-            Of::Colour(look, scale) => {
-                let refused = |what: String| Error::scene(format!("{}: {what}", image.at));
-                let largest = texture.largest();
-                if let Some(c) = (0..3).find(|&c| largest[c] <= 0.0 || largest[c] >= 1.0) {
-                    return Err(refused(format!(
-                        "the largest {} of {} is {}: a colour is above 0 and below 1 where it is brightest; give a `scale`, as 0.9, or take `tint`",
-                        ["red", "green", "blue"][c],
-                        texture.name(),
-                        largest[c]
-                    )));
-                }
-                let look = Look { colour: largest.0.map(f64::from), ..*look };
-                let medium = look.medium().map_err(|e| refused(e.to_string()))?;
-                let medium = scaled(medium, *scale).checked().map_err(|e| refused(e.to_string()))?;
-                // What enters and leaves at one point has been through the pigment twice.
-                let tint = Tint::picture(Arc::new(texture.map(|t| Rgb::from_fn(|c| (t[c] / largest[c]).sqrt()))));
-                let surface = with(&|t| {
-                    t.medium = medium;
-                    t.dye(tint.clone());
-                });
-                if let Some(inside) = &surface.inside {
-                    inside.build().map_err(|e| refused(e.to_string()))?;
-                }
-                surface
-            }
-        })
+        let Pictures { opaque, tint, colour, normal, bump, opacity } = &self.pictures;
+        let mut surface = self.surface.clone();
+        if let Some(opaque) = opaque.as_ref().filter(|opaque| opaque.images().next().is_some()) {
+            surface.bsdf = opaque.pictured(loader)?;
+        }
+        if let (Some(image), Some(inside)) = (tint, &mut surface.inside) {
+            inside.dye(Tint::picture(loader.load(image)?));
+        }
+        if let (Some((image, look, scale)), Some(inside)) = (colour, &mut surface.inside) {
+            coloured(inside, image, loader.load(image)?, (*look, *scale))
+                .map_err(|what| Error::scene(format!("{}: {what}", image.at)))?;
+        }
+        if let Some((image, strength)) = normal {
+            surface.relief = Some(Arc::new(Relief::Normals(loader.load(image)?, *strength)));
+        }
+        if let Some((image, height)) = bump {
+            surface.relief = Some(Arc::new(Relief::Heights(loader.load(image)?, *height)));
+        }
+        if let Some(image) = opacity {
+            surface.opacity = Some(loader.load(image)?);
+        }
+        Ok(surface)
     }
+}
+
+/// Gives a body the colours of a picture: the medium of its brightest ones, and pigment.
+fn coloured(
+    inside: &mut Translucent,
+    image: &TextureEntry,
+    texture: Arc<Texture>,
+    (look, scale): (Look, f64),
+) -> std::result::Result<(), String> {
+    let largest = texture.largest();
+    if let Some(c) = (0..3).find(|&c| largest[c] <= 0.0 || largest[c] >= 1.0) {
+        return Err(format!(
+            "the largest {} of {} is {}: a colour is above 0 and below 1 where it is brightest; give a `scale`, as 0.9, or take `tint`",
+            ["red", "green", "blue"][c],
+            image.image.display(),
+            largest[c]
+        ));
+    }
+    let look = Look { colour: largest.0.map(f64::from), ..look };
+    let medium = look.medium().map_err(|e| e.to_string())?;
+    inside.medium = scaled(medium, scale).checked().map_err(|e| e.to_string())?;
+    // What enters and leaves at one point has been through the pigment twice.
+    inside.dye(Tint::picture(Arc::new(texture.map(|t| Rgb::from_fn(|c| (t[c] / largest[c]).sqrt())))));
+    inside.build().map_err(|e| e.to_string())?;
+    Ok(())
 }
 
 /// With both coefficients multiplied.
@@ -163,7 +196,7 @@ fn refractive_index(n: &Node) -> Option<f64> {
 fn translucent(
     m: &Fields<'_>,
     unit_in_mm: f64,
-    (without_thickness, picture): (&mut Option<String>, &mut Option<Picture>),
+    (without_thickness, pictures): (&mut Option<String>, &mut Pictures),
 ) -> Result<Surface> {
     let keys = [
         "type",
@@ -183,6 +216,8 @@ fn translucent(
         "exit_normalisation",
         "roughness",
         "tint",
+        "normal",
+        "bump",
     ];
     m.only("a translucent material", &keys)?;
     let scale = m.get("scale", "a number above 0", |n| n.number().filter(|v| *v > 0.0))?.unwrap_or(1.0);
@@ -193,7 +228,7 @@ fn translucent(
         Some(name) => preset(m, name, unit_in_mm, eta)?,
         None if m.has("colour") || m.has("mean_free_path") => {
             let look = look(m, unit_in_mm, eta, colours.is_some())?;
-            by_colour = colours.map(|image| Picture { image, of: Of::Colour(look, scale) });
+            by_colour = colours.map(|image| (image, look, scale));
             let medium = look.medium().map_err(|e| m.error(format!("{e}; see `per` and `mean_free_path`")))?;
             (medium, format!("{}, from its colour", m.at()))
         }
@@ -207,7 +242,7 @@ fn translucent(
         Some(rough) => format!("{source}, {}", rough.text()),
         None => source,
     };
-    let tints = textures::read(m, "tint")?.map(|image| Picture { image, of: Of::Tint });
+    let tints = textures::read(m, "tint")?;
     let share = |n: &Node| colour(n, |v| (0.0..=1.0).contains(&v));
     let tint = match &tints {
         None => m.get("tint", "one number or three from 0 to 1, or { image = \"FILE\" }", share)?,
@@ -218,7 +253,7 @@ fn translucent(
             m.error_at("tint", "stands beside a picture for `colour`, which tints the boundary: remove one of them")
         );
     }
-    *picture = by_colour.or(tints);
+    (pictures.tint, pictures.colour) = (tints, by_colour);
     let mut translucent = Translucent {
         medium,
         rough: rough.map(Arc::new),

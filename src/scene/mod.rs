@@ -16,6 +16,7 @@ mod insides;
 mod lens;
 mod lights;
 mod load;
+mod masks;
 mod materials;
 mod objects;
 mod obstacle;

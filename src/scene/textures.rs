@@ -22,6 +22,8 @@ pub struct TextureEntry {
     pub scale: Rgb,
     /// What is beyond its edges.
     pub wrap: Wrap,
+    /// Whether it is numbers, not colours: codes of PNG and JPEG are then shares of the largest one.
+    pub is_data: bool,
     /// File and line, for messages.
     pub at: String,
 }
@@ -35,19 +37,42 @@ pub(super) fn read(m: &Fields<'_>, key: &str) -> Result<Option<TextureEntry>> {
     }
     let Some(t) = m.table(key)? else { return Ok(None) };
     t.only("a picture on a surface", &["image", "layer", "scale", "wrap"])?;
+    picture(m, key, &t, false).map(Some)
+}
+
+/// The picture of numbers under `key`, if there is one, and the number under `more` beside its file.
+pub(super) fn read_data(m: &Fields<'_>, key: &str, more: Option<&str>) -> Result<Option<(TextureEntry, Option<f64>)>> {
+    if !m.has(key) {
+        return Ok(None);
+    }
+    if !m.is_table(key) {
+        return Err(m.error_at(key, "is a picture: { image = \"FILE\" }"));
+    }
+    let Some(t) = m.table(key)? else { return Ok(None) };
+    let keys: Vec<&str> = ["image", "layer", "scale", "wrap"].into_iter().chain(more).collect();
+    t.only("a picture of numbers on a surface", &keys)?;
+    let number = match more {
+        None => None,
+        Some(more) => t.get(more, "a number", |n| n.number().filter(|v| (*v as f32).is_finite()))?,
+    };
+    Ok(Some((picture(m, key, &t, true)?, number)))
+}
+
+fn picture(m: &Fields<'_>, key: &str, t: &Fields<'_>, is_data: bool) -> Result<TextureEntry> {
     let scale = t.get("scale", "one number or three, none negative", |n| colour(n, |v| v >= 0.0))?;
     let wrap = |n: &Node| match n.text()? {
         "repeat" => Some(Wrap::Repeat),
         "clamp" => Some(Wrap::Clamp),
         _ => None,
     };
-    Ok(Some(TextureEntry {
+    Ok(TextureEntry {
         image: t.need("image", FILES, |n| n.text().filter(|t| !t.is_empty()))?.into(),
         layer: t.get("layer", "the name of a layer", Node::text)?.map(String::from),
         scale: scale.map_or(Rgb::WHITE, rgb),
         wrap: t.get("wrap", "\"repeat\" or \"clamp\"", wrap)?.unwrap_or_default(),
+        is_data,
         at: m.at_key(key),
-    }))
+    })
 }
 
 /// Refuses pictures under all keys but these.
@@ -55,7 +80,7 @@ pub(super) fn refuse_elsewhere(m: &Fields<'_>, places: &[&str]) -> Result<()> {
     match m.keys().find(|key| m.is_table(key) && !places.contains(key)) {
         Some(key) => Err(m.error_at(
             key,
-            "is a table: pictures are for `albedo` of type = \"diffuse\", and `tint` or `colour` of type = \"translucent\"; give numbers",
+            "is a table: pictures are for `albedo` and `roughness` of opaque surfaces, and `tint` or `colour` of type = \"translucent\"; give numbers",
         )),
         None => Ok(()),
     }
@@ -90,7 +115,8 @@ impl TextureEntry {
     /// Reads the picture, which is looked for in `folder`; what is odd about it goes to `said`.
     fn load(&self, folder: &Path, said: &mut Vec<String>) -> Result<Texture> {
         let path = folder.join(&self.image);
-        let read = FilePicture::read_texture(&path, self.layer.as_deref()).map_err(|e| e.within(&self.at))?;
+        let read =
+            FilePicture::read_texture(&path, self.layer.as_deref(), self.is_data).map_err(|e| e.within(&self.at))?;
         said.extend(read.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
         let mut image = read.image;
         let [width, height] = image.resolution;

@@ -21,9 +21,14 @@ impl View<'_> {
         self.scene.objects[hit.mesh as usize].mesh.point(hit.triangle, hit.u, hit.v)
     }
 
-    /// The point of `hit`, its normals towards where a ray into `direction` came from.
+    /// The point of `hit`, its normals towards where a ray into `direction` came from, that for shading bent by the surface's relief.
     #[inline]
     pub fn point(&self, hit: &Hit, direction: Vec3) -> SurfacePoint {
-        self.outwards(hit).facing(-direction)
+        let at = self.outwards(hit);
+        let at = match &self.scene.surface(hit.mesh).relief {
+            None => at,
+            Some(relief) => relief.bend(at, self.scene.objects[hit.mesh as usize].mesh.tangents(hit.triangle)),
+        };
+        at.facing(-direction)
     }
 }

@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
-use crate::surface::{Boundary, Bsdf, Lambertian, RoughBoundary, Texture, Textured, Tint};
+use crate::surface::{Boundary, Bsdf, Lambertian, Relief, RoughBoundary, Texture, Tint};
 use std::sync::Arc;
 
 /// A scene whose numbers have been checked.
@@ -80,6 +80,10 @@ pub struct Surface {
     pub inside: Option<Translucent>,
     /// What is there of a clear body.
     pub clear: Option<Dielectric>,
+    /// What bends its shading normals.
+    pub relief: Option<Arc<Relief>>,
+    /// Chance that it is there at a point, the red channel; of opaque surfaces.
+    pub opacity: Option<Arc<Texture>>,
 }
 
 /// The inside of a clear body: it refracts and absorbs, but does not scatter.
@@ -108,17 +112,12 @@ impl Surface {
 
     /// An opaque surface of any kind.
     pub fn opaque(bsdf: Arc<dyn Bsdf>) -> Self {
-        Self { bsdf, emission: None, inside: None, clear: None }
-    }
-
-    /// Lambertian, both sides alike, with a picture for albedo: of objects with texture coordinates.
-    pub fn textured(albedo: Arc<Texture>) -> Self {
-        Self::opaque(Arc::new(Textured { albedo }))
+        Self { bsdf, emission: None, inside: None, clear: None, relief: None, opacity: None }
     }
 
     /// A lamp, which reflects nothing.
     pub fn emissive(emission: Emission) -> Self {
-        Self { bsdf: Arc::new(Lambertian::BLACK), emission: Some(emission), inside: None, clear: None }
+        Self { emission: Some(emission), ..Self::opaque(Arc::new(Lambertian::BLACK)) }
     }
 
     /// A scattering medium behind its boundary.
@@ -127,18 +126,19 @@ impl Surface {
             Some(rough) => rough.clone(),
             None => Arc::new(Boundary { eta: inside.medium.eta }),
         };
-        Self { bsdf, emission: None, inside: Some(inside), clear: None }
+        Self { inside: Some(inside), ..Self::opaque(bsdf) }
     }
 
     /// A clear body behind a smooth boundary.
     pub fn dielectric(clear: Dielectric) -> Self {
-        Self { bsdf: Arc::new(Boundary { eta: clear.eta }), emission: None, inside: None, clear: Some(clear) }
+        Self { clear: Some(clear), ..Self::opaque(Arc::new(Boundary { eta: clear.eta })) }
     }
 
     /// The pictures on it, for which points need texture coordinates.
     pub fn pictures(&self) -> impl Iterator<Item = &Arc<Texture>> {
         let tint = self.inside.as_ref().and_then(|inside| inside.tint.as_ref()).filter(|tint| tint.is_picture());
-        self.bsdf.texture().into_iter().chain(tint.map(Tint::shares))
+        let relief = self.relief.as_ref().map(|relief| relief.texture());
+        self.bsdf.textures().into_iter().chain(tint.map(Tint::shares)).chain(relief).chain(&self.opacity)
     }
 
     /// What fills the body behind it; of translucent and clear bodies.

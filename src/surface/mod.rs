@@ -2,12 +2,15 @@
 //! inside a body (`integrator/volume_path`). Read first: [`Bsdf`]; each kind is one file.
 
 mod boundary;
+mod colour;
 mod conductor;
+mod graded;
 mod interface;
 mod lambertian;
 mod microfacets;
 mod oren_nayar;
 mod plastic;
+mod relief;
 mod rough_boundary;
 mod texture;
 mod textured;
@@ -16,11 +19,14 @@ mod tint;
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
 pub use boundary::Boundary;
+pub use colour::Colour;
 pub use conductor::{Conductor, METALS, Reflectance};
+pub use graded::Graded;
 pub use interface::{Interface, RoughReflection};
 pub use lambertian::Lambertian;
 pub use oren_nayar::OrenNayar;
 pub use plastic::Plastic;
+pub use relief::Relief;
 pub use rough_boundary::RoughBoundary;
 use std::sync::Arc;
 pub use texture::{Texture, Wrap};
@@ -58,9 +64,9 @@ pub trait Bsdf: Send + Sync + std::fmt::Debug {
         self.albedo()
     }
 
-    /// The picture on it, for which points need texture coordinates.
-    fn texture(&self) -> Option<&Arc<Texture>> {
-        None
+    /// The pictures on it, for which points need texture coordinates.
+    fn textures(&self) -> Vec<&Arc<Texture>> {
+        Vec::new()
     }
 
     /// What `check` says of it.

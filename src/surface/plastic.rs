@@ -1,18 +1,19 @@
 //! A matt body under a clear coat: plastic, glazed china, varnished wood.
 
 use super::microfacets::{DirectionalAlbedo, Microfacets, local};
-use super::{Bsdf, BsdfSample};
+use super::{Bsdf, BsdfSample, Colour, Texture};
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3, frame};
 use crate::optics::{reflect, reflectance};
 use crate::sampling::hemisphere;
 use std::f32::consts::FRAC_1_PI;
+use std::sync::Arc;
 
 /// A dielectric coat, smooth or rough, over a matt body: what the coat does not mirror comes back by the body's albedo, in reciprocal
 /// shares, so that a white one loses no light \[KSK01\]. Points face the viewer.
 #[derive(Clone, Debug)]
 pub struct Plastic {
-    albedo: Rgb,
+    albedo: Colour,
     eta: f32,
     roughness: f32,
     /// Of the coat; `None` of a smooth one. What its tiny mirrors throw to one another goes into the body.
@@ -23,10 +24,16 @@ pub struct Plastic {
 
 impl Plastic {
     /// `albedo` of the matt body in [0, 1]; `eta` of the coat over air's, at least 1; `roughness` in [0, 1].
-    pub fn new(albedo: Rgb, eta: f32, roughness: f32) -> Self {
+    pub fn new(albedo: impl Into<Colour>, eta: f32, roughness: f32) -> Self {
         let fresnel = |mu| Rgb::splat(reflectance(eta, mu));
         let facets = Microfacets::new(roughness);
-        Self { albedo, eta, roughness, facets, coat: DirectionalAlbedo::new(facets, fresnel) }
+        Self { albedo: albedo.into(), eta, roughness, facets, coat: DirectionalAlbedo::new(facets, fresnel) }
+    }
+
+    /// Share of even light that comes back, the body being of this albedo.
+    fn with_coat(&self, albedo: Rgb) -> Rgb {
+        let coat = self.coat.mean[0];
+        albedo.map(|a| coat + a * (1.0 - coat))
     }
 
     fn fresnel(&self, mu: f32) -> Rgb {
@@ -38,26 +45,26 @@ impl Plastic {
         1.0 - self.coat.at(cosine)[0]
     }
 
-    /// f of the matt body.
-    fn body(&self, wo: Vec3, wi: Vec3) -> Rgb {
+    /// f of the matt body of this albedo.
+    fn body(&self, albedo: Rgb, wo: Vec3, wi: Vec3) -> Rgb {
         let shares = self.passed(wo.z) * self.passed(wi.z) / (1.0 - self.coat.mean[0]);
-        self.albedo * (shares * FRAC_1_PI)
+        albedo * (shares * FRAC_1_PI)
     }
 
     /// Share of the samples that are of the coat.
-    fn by_coat(&self, wo: Vec3) -> f32 {
+    fn by_coat(&self, albedo: Rgb, wo: Vec3) -> f32 {
         let coat = self.coat.at(wo.z)[0];
-        let body = self.albedo.max() * (1.0 - coat);
+        let body = albedo.max() * (1.0 - coat);
         if coat + body > 0.0 { coat / (coat + body) } else { 0.0 }
     }
 
     /// f cosθ_i and the density of `wi` [1/sr], without what a smooth coat mirrors.
-    fn value(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+    fn value(&self, albedo: Rgb, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
         if wo.z <= 0.0 || wi.z <= 0.0 {
             return (Rgb::BLACK, 0.0);
         }
-        let share = self.by_coat(wo);
-        let (body, by_body) = (self.body(wo, wi) * wi.z, (1.0 - share) * wi.z * FRAC_1_PI);
+        let share = self.by_coat(albedo, wo);
+        let (body, by_body) = (self.body(albedo, wo, wi) * wi.z, (1.0 - share) * wi.z * FRAC_1_PI);
         match self.facets {
             None => (body, by_body),
             Some(facets) => {
@@ -72,13 +79,13 @@ impl Bsdf for Plastic {
     fn eval(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> Rgb {
         let n = at.normal_seen_from(wo);
         let (wo, wi) = (local(n, wo), local(n, wi));
-        if wi.z > 0.0 { self.value(wo, wi).0 * (1.0 / wi.z) } else { Rgb::BLACK }
+        if wi.z > 0.0 { self.value(self.albedo.at(at), wo, wi).0 * (1.0 / wi.z) } else { Rgb::BLACK }
     }
 
     fn sample(&self, at: &SurfacePoint, wo: Vec3, [u, v, which]: [f32; 3]) -> Option<BsdfSample> {
         let n = at.normal_seen_from(wo);
-        let own = local(n, wo);
-        let share = self.by_coat(own);
+        let (own, albedo) = (local(n, wo), self.albedo.at(at));
+        let share = self.by_coat(albedo, own);
         let wi = match self.facets {
             None if which < share => {
                 let weight = self.fresnel(n.dot(wo)) * (1.0 / share);
@@ -87,21 +94,28 @@ impl Bsdf for Plastic {
             Some(facets) if which < share => facets.sample(own, [u, v]),
             _ => Vec3::from_array(hemisphere([u, v])),
         };
-        let (value, pdf) = self.value(own, wi);
+        let (value, pdf) = self.value(albedo, own, wi);
         (pdf > 0.0).then(|| BsdfSample { wi: frame(n) * wi, weight: value * (1.0 / pdf), pdf })
     }
 
     fn pdf(&self, at: &SurfacePoint, wo: Vec3, wi: Vec3) -> f32 {
         let n = at.normal_seen_from(wo);
-        self.value(local(n, wo), local(n, wi)).1
+        self.value(self.albedo.at(at), local(n, wo), local(n, wi)).1
     }
 
     fn albedo(&self) -> Rgb {
-        let coat = self.coat.mean[0];
-        self.albedo.map(|a| coat + a * (1.0 - coat))
+        self.with_coat(self.albedo.mean())
+    }
+
+    fn albedo_at(&self, at: &SurfacePoint) -> Rgb {
+        self.with_coat(self.albedo.at(at))
+    }
+
+    fn textures(&self) -> Vec<&Arc<Texture>> {
+        self.albedo.picture().into_iter().collect()
     }
 
     fn text(&self) -> String {
-        format!("plastic, albedo {:?}, eta {}, roughness {}", self.albedo.0, self.eta, self.roughness)
+        format!("plastic, albedo {}, eta {}, roughness {}", self.albedo.text(), self.eta, self.roughness)
     }
 }

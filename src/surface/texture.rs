@@ -62,6 +62,21 @@ impl Texture {
         ([index(below as i64), index(below as i64 + 1)], (place - below) as f32)
     }
 
+    /// Derivatives of the red channel by both texture coordinates: of differences over one texel.
+    pub fn slope(&self, [u, v]: [f32; 2]) -> [f32; 2] {
+        let [w, h] = self.resolution().map(|n| n as f32);
+        let (du, dv) = (0.5 / w, 0.5 / h);
+        [
+            (self.at([u + du, v])[0] - self.at([u - du, v])[0]) * w,
+            (self.at([u, v + dv])[0] - self.at([u, v - dv])[0]) * h,
+        ]
+    }
+
+    /// What `check` says of it.
+    pub fn text(&self) -> String {
+        format!("{}, {} x {} pixels, mean {:?}", self.name, self.width, self.height, self.mean.0)
+    }
+
     /// Each texel made into another, in [0, 1].
     pub fn map(&self, of: impl Fn(Rgb) -> Rgb) -> Self {
         Self::new(self.name.clone(), self.width, self.texels.iter().map(|t| of(*t)).collect(), self.wrap)

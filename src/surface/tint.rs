@@ -43,11 +43,10 @@ impl Tint {
 
     /// What `check` says of it.
     pub fn text(&self) -> String {
-        let mean = self.shares.mean().0;
-        if !self.is_picture {
-            return format!("tint {mean:?}");
+        if self.is_picture {
+            format!("tint by {}", self.shares.text())
+        } else {
+            format!("tint {:?}", self.shares.mean().0)
         }
-        let [width, height] = self.shares.resolution();
-        format!("tint by {}, {width} x {height} pixels, mean {mean:?}", self.shares.name())
     }
 }
