@@ -12,7 +12,9 @@ use marmor::optics::{reflectance, transmittance};
 use marmor::query::{self, Backend};
 use marmor::scene::{Scene, SceneFile, View};
 use parts::{camera, cuboid, diffuse, emissive, mesh, rectangle, sky, translucent};
-use rendering::{Within, agree, average, channels, film, load, load_beside, mean_of, means_of, options, subsurface};
+use rendering::{
+    Within, agree, average, channels, film, load, load_beside, load_in, mean_of, means_of, options, subsurface,
+};
 use std::f64::consts::PI;
 
 const PATHS: &str = "[method]\nname = \"volume_path\"\n";
@@ -253,6 +255,18 @@ fn curved_sheets_are_white_in_a_white_furnace() {
 }
 
 /// A sheet that is crossed by itself, bends too sharply, or is none, is refused with its name, the reason and the remedy.
+/// Faces around one corner of a gently bent sheet lie in each other's planes up to the gap of rays in f32, and meet nowhere else.
+#[test]
+fn a_gently_bent_sheet_of_long_faces_does_not_meet_itself() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/leaf");
+    let text = camera([0.0, 40.0, 300.0], [0.0, 40.0, 0.0], 30.0, [4, 4])
+        + &thick(&mesh("leaf", "leaf.obj", "leaf"), 1.0)
+        + &translucent("leaf", "sigma_s_prime = 3\nsigma_a = 0\neta = 1.4")
+        + &sky(1.0);
+    let scene = load_in(&folder, &text);
+    assert!(scene.why_double.is_none(), "{:?}", scene.why_double);
+}
+
 #[test]
 fn what_makes_no_sheet_is_refused_by_name() {
     // Two leaves of a hairpin 0.1 apart, around a bend of radius 0.05; in steps of 15 degrees.

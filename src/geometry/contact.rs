@@ -184,8 +184,15 @@ fn meet((a, i): (&Solid, u32), (b, j): (&Solid, u32), gap: f64, seek: Seek) -> O
     if to - from <= 4.0 * gap {
         return None;
     }
-    let share = (0.5 * (from + to) - at(&first, 0)) / (at(&first, 1) - at(&first, 0));
-    let point = first.ends[0].lerp(first.ends[1], share);
+    let middle = |cut: &Cut| {
+        let share = (0.5 * (from + to) - at(cut, 0)) / (at(cut, 1) - at(cut, 0));
+        cut.ends[0].lerp(cut.ends[1], share)
+    };
+    let point = middle(&first);
+    // Neighbours on a surface that hardly bends are in each other's planes, but for less than the gap, along edges that lie apart.
+    if point.distance(middle(&second)) > 8.0 * gap {
+        return None;
+    }
     let height = |face: &Face, size: f64| {
         let [a, b, c] = face.corners;
         size / (b - a).length().max((c - b).length()).max((a - c).length())
