@@ -12,7 +12,7 @@ use marmor::bssrdf::{ModelName, ModelOptions, WidthFit};
 use marmor::film::{
     Checkpoint, FilePicture, Film, Identity, Image, Metadata, PngOptions, Window, read_attributes, save,
 };
-use marmor::geometry::{examine, load_obj_with_uv, mended};
+use marmor::geometry::{examine, load_mesh_with_uv, mended};
 use marmor::integrator::{Direct, Subsurface, SubsurfaceOptions};
 use marmor::math::{DVec3, Rgb, hash};
 use marmor::report::{Batch, BatchOptions};
@@ -274,7 +274,7 @@ fn obj() {
     fuzz("obj", &lines(&[cube, colours, plate, soup]), |bytes, folder| {
         let path = folder.join("m.obj");
         std::fs::write(&path, bytes).unwrap();
-        let Ok(mesh) = load_obj_with_uv(&path) else { return false };
+        let Ok(mesh) = load_mesh_with_uv(&path) else { return false };
         let _ = mesh.without_uv();
         examine(&mesh.recentred(DVec3::ZERO));
         let (mesh, _) = mended(mesh);

@@ -6,7 +6,7 @@ use super::need;
 use super::setup::{MethodArgs, prepare};
 use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
-use marmor::geometry::{Mended, load_obj_with_uv, mended, write_obj};
+use marmor::geometry::{Mended, load_mesh_with_uv, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
 use marmor::optics::{ChannelOptics, HalfSpace, Medium};
 use marmor::query;
@@ -210,7 +210,7 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
     let mut all = Vec::new();
     for entry in &prepared.file.objects {
         let Geometry::Mesh(path) = &entry.geometry else { continue };
-        let mesh = load_obj_with_uv(&scene_folder.join(path))?;
+        let mesh = load_mesh_with_uv(&scene_folder.join(path))?;
         let (mesh, done) = mended(if entry.flip { mesh.flipped() } else { mesh });
         if done == Mended::default() {
             continue;

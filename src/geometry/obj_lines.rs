@@ -2,23 +2,11 @@
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
 use super::CornerUv;
+use super::loading::{Budget, MAX_COUNT, MAX_LINE};
 use super::obj_remarks::{CALLS, CURVED, KNOWN, OddLines};
+use crate::Error;
 use crate::words::either;
-use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
-
-/// Memory while a mesh is read, looked at and put into a tree [bytes/triangle], at its most; measured with a million that have
-/// normals. `cli/need.rs` tells it apart by what takes it.
-pub const LOADING_BYTES: usize = 265;
-
-/// The same of texture coordinates, where they are asked for: as typed, and of each corner.
-const UV_BYTES: usize = 72;
-
-/// Longer than any real line, polygons of a million corners included; keeps a binary file from being read as one.
-const MAX_LINE: usize = 1 << 24;
-
-/// This many vertices, normals or triangles are refused, so that indices stay below 2^32.
-const MAX_COUNT: usize = 1 << 31;
 
 /// Texture coordinates as they are typed. tobj, which refuses a file for one bad number, does not see them.
 #[derive(Default)]
@@ -83,8 +71,7 @@ pub(super) struct ObjLines<R> {
     odd: OddLines,
     complaint: Option<(usize, String)>,
     failed: Option<io::Error>,
-    /// Entries at which memory is looked at next.
-    look_at: usize,
+    budget: Budget,
     out_of_memory: Option<Error>,
 }
 
@@ -118,7 +105,7 @@ impl<R: BufRead> ObjLines<R> {
             odd: OddLines::default(),
             complaint: None,
             failed: None,
-            look_at: 1 << 20,
+            budget: Budget::new(uv),
             out_of_memory: None,
         }
     }
@@ -170,15 +157,7 @@ impl<R: BufRead> ObjLines<R> {
 
     /// Whether there is memory to read on: as much again as what has been read needs.
     fn fits(&mut self, count: usize) -> bool {
-        if count < self.look_at {
-            return true;
-        }
-        self.look_at = 2 * count;
-        let bytes = LOADING_BYTES + if self.uv.is_some() { UV_BYTES } else { 0 };
-        let needed = count as u128 * bytes as u128;
-        let what = format!("a mesh of {count} or more vertices or triangles");
-        let checked = memory::require(needed, memory::available(), &what, "use a coarser mesh");
-        self.out_of_memory = checked.err();
+        self.out_of_memory = self.budget.check(count).err();
         self.out_of_memory.is_none()
     }
 

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, Solid, examine, load_obj, load_obj_with_uv, mended,
+    Findings, LOADING_BYTES, Mended, Mesh, Precision, RawMesh, Solid, examine, load_mesh, load_mesh_with_uv, mended,
     rectangle, rectangle_uv, sphere, sphere_uv,
 };
 use crate::math::{Aabb, DVec3};
@@ -50,7 +50,7 @@ impl Scene {
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
-        let mut placed: Vec<Option<ObjMesh>> = placed.into_iter().map(Some).collect();
+        let mut placed: Vec<Option<RawMesh>> = placed.into_iter().map(Some).collect();
         let mut objects = Vec::with_capacity(placed.len());
         for group in grouped(&file.objects) {
             let entry = &file.objects[group[0]];
@@ -59,7 +59,7 @@ impl Scene {
                 _ => 0,
             };
             let alone = group.iter().map(|&i| alone(i)).sum();
-            let meshes: Vec<ObjMesh> = group.iter().filter_map(|&i| placed[i].take()).collect();
+            let meshes: Vec<RawMesh> = group.iter().filter_map(|&i| placed[i].take()).collect();
             let as_placed = one_mesh(meshes, centre);
             let mesh = as_placed.recentred(centre);
             drop(as_placed);
@@ -169,20 +169,20 @@ fn lights_outside(scene: &Scene) -> Result<()> {
 }
 
 /// The mesh of a body of several objects, or of one.
-fn one_mesh(mut meshes: Vec<ObjMesh>, centre: DVec3) -> ObjMesh {
+fn one_mesh(mut meshes: Vec<RawMesh>, centre: DVec3) -> RawMesh {
     if meshes.len() == 1 {
         return meshes.pop().unwrap_or_default();
     }
-    let closed = |mesh: &ObjMesh| {
+    let closed = |mesh: &RawMesh| {
         let found = examine(&mesh.recentred(centre));
         found.open_edges == 0 && found.mixed_edges == 0
     };
-    ObjMesh::joined(meshes.into_iter().map(|mesh| (closed(&mesh), mesh)).map(|(closed, mesh)| (mesh, closed)).collect())
+    RawMesh::joined(meshes.into_iter().map(|mesh| (closed(&mesh), mesh)).map(|(closed, mesh)| (mesh, closed)).collect())
 }
 
 /// The objects' meshes in the scene's space, in f64.
-fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
-    let mut read: HashMap<PathBuf, ObjMesh> = HashMap::new();
+fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<RawMesh>> {
+    let mut read: HashMap<PathBuf, RawMesh> = HashMap::new();
     let path_of = |entry: &ObjectEntry| match &entry.geometry {
         Geometry::Mesh(path) => Some(folder.join(path)),
         _ => None,
@@ -212,7 +212,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                 let path = folder.join(path);
                 if !read.contains_key(&path) {
                     let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
-                    let load = if with_uv.contains(&path) { load_obj_with_uv } else { load_obj };
+                    let load = if with_uv.contains(&path) { load_mesh_with_uv } else { load_mesh };
                     let mesh = load(&path).map_err(within)?;
                     said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
                     read.insert(path.clone(), mesh);
@@ -237,7 +237,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
 }
 
 /// Refuses an object that has a picture and no coordinates for it.
-fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> {
+fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &RawMesh) -> Result<()> {
     let (material, all) = (&file.materials[entry.material], mesh.triangles.len());
     let without = if material.albedo_image.is_some() { mesh.without_uv() } else { 0 };
     if without == 0 {
@@ -258,7 +258,7 @@ fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> 
     )))
 }
 
-fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<String>) -> ObjMesh {
+fn place(entry: &ObjectEntry, mut mesh: RawMesh, repair: bool, said: &mut Vec<String>) -> RawMesh {
     if entry.normals != NormalsChoice::Auto {
         mesh.normals = None;
     }
@@ -308,6 +308,6 @@ fn smooths_nothing(entry: &ObjectEntry, alone: usize, found: &Findings, transluc
 }
 
 /// Middle of the box around all meshes.
-fn centre<'a>(meshes: impl IntoIterator<Item = &'a ObjMesh>) -> Option<DVec3> {
-    meshes.into_iter().filter_map(ObjMesh::bounds).reduce(Aabb::join).map(|bounds| bounds.centre())
+fn centre<'a>(meshes: impl IntoIterator<Item = &'a RawMesh>) -> Option<DVec3> {
+    meshes.into_iter().filter_map(RawMesh::bounds).reduce(Aabb::join).map(|bounds| bounds.centre())
 }
