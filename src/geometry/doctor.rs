@@ -165,7 +165,9 @@ pub fn mended(mesh: RawMesh) -> (RawMesh, Mended) {
         let of = |&t: &u32| uv[t as usize].map(|[a, b, c]| if turn[t as usize] { [a, c, b] } else { [a, b, c] });
         faces.kept.iter().map(of).collect()
     });
-    (RawMesh { triangles, normals, uv, ..mesh }, done)
+    // Triangles have other numbers now.
+    let parts = super::Parts::default();
+    (RawMesh { triangles, normals, uv, parts, ..mesh }, done)
 }
 
 /// For each vertex the first one of its group at the same place.

@@ -4,9 +4,9 @@ use std::io::{BufRead, Write};
 use std::path::Path;
 
 use super::obj_lines::ObjLines;
-use super::obj_remarks::OddPolygons;
+use super::odd_polygons::OddPolygons;
 use super::polygon::triangulate;
-use super::{RawMesh, RawNormals};
+use super::{Parts, RawMesh, RawNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::words::counted;
@@ -106,12 +106,18 @@ fn cut<R: BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> RawMesh {
         ..RawMesh::default()
     };
     let mut polygon_lines = lines.polygon_lines().iter();
-    let (mut corners, mut triangles, mut odd) = (Vec::new(), Vec::new(), OddPolygons::default());
+    let (mut corners, mut triangles, mut odd) = (Vec::new(), Vec::new(), OddPolygons::new("in line"));
+    let labelled = lines.labelled();
+    let mut runs = labelled.runs().iter().peekable();
+    let mut runs_out = Vec::with_capacity(labelled.runs().len());
     let mut start = 0;
     for (face, &has_normals) in lines.has_normals().iter().enumerate() {
         // Without arities all faces are triangles.
         let arity = mesh.face_arities.get(face).map_or(3, |&n| n as usize);
         let of = |indices: &[u32], t: [u32; 3]| t.map(|i| indices[start + i as usize]);
+        if let Some((_, label)) = runs.next_if(|(first, _)| *first as usize == face) {
+            runs_out.push((out.triangles.len() as u32, *label));
+        }
         triangles.clear();
         if arity == 3 {
             triangles.push([0, 1, 2]);
@@ -132,17 +138,14 @@ fn cut<R: BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> RawMesh {
         }
         start += arity;
     }
+    out.parts = Parts::new(labelled.labels().to_vec(), runs_out);
     out.remarks = odd.remarks().collect();
     out
 }
 
 /// The file's normals, if any face has them; 0 stands for one without a direction.
 fn vectors(mesh: &tobj::Mesh, has: &[bool]) -> Option<Vec<DVec3>> {
-    let unit = |n: &[f64]| {
-        let n = DVec3::new(n[0], n[1], n[2]);
-        // Divided by its largest component first, so that no length overflows or vanishes.
-        (n / n.abs().max_element()).normalize_or_zero()
-    };
+    let unit = |n: &[f64]| super::unit_or_zero(DVec3::new(n[0], n[1], n[2]));
     has.contains(&true).then(|| mesh.normals.chunks_exact(3).map(unit).collect())
 }
 
@@ -156,5 +159,5 @@ fn explain(error: tobj::LoadError, line: &str) -> String {
         E::FaceVertexOutOfBounds | E::FaceNormalOutOfBounds => ("a face of vertices that do not exist", "export again"),
         other => return format!("not readable as OBJ: {other}"),
     };
-    format!("{what} in `{}`; {remedy}", super::obj_lines::shown(line))
+    format!("{what} in `{}`; {remedy}", super::shown(line))
 }

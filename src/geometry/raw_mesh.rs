@@ -3,10 +3,10 @@
 
 use std::collections::HashMap;
 
-use super::{CornerUv, Mesh, Normals};
+use super::{CornerUv, Mesh, Normals, Parts};
 use crate::math::{Aabb, DAffine3, DVec3, Vec3};
 
-/// What an OBJ file or a shape holds, before any transform.
+/// What a mesh file or a shape holds, before any transform.
 #[derive(Clone, Debug, Default)]
 pub struct RawMesh {
     /// Positions as typed.
@@ -19,6 +19,8 @@ pub struct RawMesh {
     pub uv: Option<Vec<Option<CornerUv>>>,
     /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
     pub groups: Vec<u32>,
+    /// What its file calls its triangles; said of them in the order of the file.
+    pub parts: Parts,
     /// What a user should hear of: what the file has besides, and what is odd about its polygons.
     pub remarks: Vec<String>,
 }

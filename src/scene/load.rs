@@ -1,9 +1,9 @@
 //! The way from the file as typed to the checked world: meshes read, placed and recentred in f64, then rounded.
 
-use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::file::SceneFile;
+use super::mesh_files::MeshFiles;
 use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
 use super::{
@@ -12,15 +12,15 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Findings, LOADING_BYTES, Mended, Mesh, Precision, RawMesh, Solid, examine, load_mesh, load_mesh_with_uv, mended,
-    rectangle, rectangle_uv, sphere, sphere_uv,
+    Findings, LOADING_BYTES, Mended, Mesh, Precision, RawMesh, Solid, examine, mended, rectangle, rectangle_uv, sphere,
+    sphere_uv,
 };
 use crate::math::{Aabb, DVec3};
 use crate::memory;
 use crate::words::{counted, either};
 
 impl Scene {
-    /// Reads the meshes of a scene file (each OBJ once) and makes the world from them. What is odd but can be
+    /// Reads the meshes of a scene file (each file once) and makes the world from them. What is odd but can be
     /// rendered is in [`Scene::warnings`].
     ///
     /// # Errors
@@ -182,16 +182,8 @@ fn one_mesh(mut meshes: Vec<RawMesh>, centre: DVec3) -> RawMesh {
 
 /// The objects' meshes in the scene's space, in f64.
 fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<RawMesh>> {
-    let mut read: HashMap<PathBuf, RawMesh> = HashMap::new();
-    let path_of = |entry: &ObjectEntry| match &entry.geometry {
-        Geometry::Mesh(path) => Some(folder.join(path)),
-        _ => None,
-    };
     let has_picture = |entry: &ObjectEntry| file.materials[entry.material].albedo_image.is_some();
-    let with_uv: HashSet<PathBuf> =
-        file.objects.iter().filter(|entry| has_picture(entry)).filter_map(path_of).collect();
-    let mut uses: HashMap<PathBuf, usize> = HashMap::new();
-    file.objects.iter().filter_map(path_of).for_each(|path| *uses.entry(path).or_default() += 1);
+    let mut files = MeshFiles::new(file, folder);
     let mut out = Vec::with_capacity(file.objects.len());
     let mut unasked = 0;
     for entry in &file.objects {
@@ -208,21 +200,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                 }
                 sphere(*centre, *radius, *rings, *segments)
             }
-            Geometry::Mesh(path) => {
-                let path = folder.join(path);
-                if !read.contains_key(&path) {
-                    let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
-                    let load = if with_uv.contains(&path) { load_mesh_with_uv } else { load_mesh };
-                    let mesh = load(&path).map_err(within)?;
-                    said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
-                    read.insert(path.clone(), mesh);
-                }
-                let left = uses.entry(path.clone()).or_default();
-                *left = left.saturating_sub(1);
-                // The last one takes it: a large mesh is not there twice.
-                let mesh = if *left == 0 { read.remove(&path) } else { read.get(&path).cloned() };
-                mesh.unwrap_or_default()
-            }
+            Geometry::Mesh(path) => files.take(file, entry, &folder.join(path), said)?,
         };
         mesh.uv = match &entry.geometry {
             _ if !has_picture(entry) => None,
@@ -249,7 +227,7 @@ fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &RawMesh) -> Result<()> 
     };
     Err(Error::scene(format!(
         "{}: object {:?}: its material {:?} is a picture, but {without} of {} of {mesh} {} no texture coordinates; export them \
-         (`vt`, at each corner of each face), or give the object another material",
+         (at each corner of each face; STL has none), or give the object another material",
         entry.at,
         entry.name,
         material.name,

@@ -17,11 +17,13 @@ mod lens;
 mod lights;
 mod load;
 mod materials;
+mod mesh_files;
 mod objects;
 mod obstacle;
 mod obstacles;
 mod opaque;
 mod options;
+mod portion;
 mod precision;
 mod seams;
 mod sheets;
@@ -45,6 +47,7 @@ pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{
     EntrySampling, Estimator, FilterName, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread,
 };
+pub use portion::Portion;
 pub use textures::TextureEntry;
 pub use walkable::ExitanceBy;
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};
