@@ -7,25 +7,13 @@ mod parts;
 mod refusals;
 mod rendering;
 
+use marmor::ErrorKind;
 use marmor::geometry::{RawMesh, load_mesh, load_mesh_with_uv};
-use marmor::scene::{Estimator, Scene, SceneFile};
-use marmor::{Error, ErrorKind};
-use meshes::{Shape, gzip};
+use marmor::scene::Estimator;
+use meshes::{Shape, base64, bits, glb, gzip, read, written};
 use parts::{camera, mesh, sky, translucent};
 use refusals::{damaged, failure};
 use std::path::Path;
-
-/// A folder with a file of this name, and its path.
-fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(name);
-    std::fs::write(&path, bytes).unwrap();
-    (folder, path)
-}
-
-fn read(name: &str, bytes: &[u8]) -> Result<RawMesh, Error> {
-    load_mesh_with_uv(&written(name, bytes).1)
-}
 
 /// The same in every format: with what PLY has, and bare triangles as STL has them.
 fn in_all_formats() -> Vec<(&'static str, Vec<u8>, Shape)> {
@@ -42,6 +30,12 @@ fn in_all_formats() -> Vec<(&'static str, Vec<u8>, Shape)> {
         ("m.stl.GZ", gzip(&bare.stl_binary()), bare.clone()),
         ("m.obj.gz", gzip(&shape.obj()), shape.clone()),
     ];
+    // glTF has triangles alone; a fan of a quadrilateral is what others make of it.
+    all.push(("m.glb", shape.glb(), shape.clone()));
+    all.push(("packed.glb.gz", gzip(&bare.glb()), bare.clone()));
+    let data = base64(&shape.gltf("").1);
+    let text = shape.gltf(&format!("\"uri\":\"data:application/octet-stream;base64,{data}\",")).0;
+    all.push(("data.gltf", text.into_bytes(), shape.clone()));
     // Line ends of the other kinds, blank lines and blanks at ends.
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     let returns = text(shape.ply_ascii()).replace('\n', "\r").into_bytes();
@@ -49,12 +43,6 @@ fn in_all_formats() -> Vec<(&'static str, Vec<u8>, Shape)> {
     let both = text(bare.stl_ascii()).replace('\n', " \r\n\r\n").replace("vertex", "VERTEX").into_bytes();
     all.push(("both.stl", both, bare));
     all
-}
-
-/// Positions, triangles, normals and texture coordinates, to the bit.
-fn bits(mesh: &RawMesh) -> String {
-    let normals = mesh.normals.as_ref().map(|n| (&n.vectors, &n.triangles));
-    format!("{:?}", (&mesh.positions, &mesh.triangles, normals, &mesh.uv))
 }
 
 #[test]
@@ -89,7 +77,7 @@ fn a_mesh_gives_one_picture_from_every_format() {
     let shape = Shape::bulged(4);
     let of_obj = [shape.clone(), shape.bare()].map(|shape| picture("m.obj", &shape.obj()));
     assert_ne!(of_obj[0], of_obj[1], "normals show");
-    let shown = ["BIG.PLY", "m.stl", "m.ply.gz"];
+    let shown = ["BIG.PLY", "m.stl", "m.ply.gz", "m.glb"];
     for (name, bytes, shape) in in_all_formats().into_iter().filter(|(name, ..)| shown.contains(name)) {
         assert!(picture(name, &bytes) == of_obj[usize::from(shape.normals.is_empty())], "{name}: another picture");
     }
@@ -114,6 +102,18 @@ fn binary_ply(property: &str, face: &[u8]) -> Vec<u8> {
     }
     out.extend(face);
     out
+}
+
+/// `shape` as glTF without its buffer, with a change.
+fn gltf(shape: &Shape, from: &str, to: &str) -> Vec<u8> {
+    let json = shape.gltf("").0;
+    assert!(json.contains(from), "{from} in {json}");
+    json.replacen(from, to, 1).into_bytes()
+}
+
+/// The same in one piece.
+fn packed(shape: &Shape, from: &str, to: &str) -> Vec<u8> {
+    glb(&String::from_utf8(gltf(shape, from, to)).unwrap(), &shape.gltf("").1)
 }
 
 fn stl(facets: &str) -> Vec<u8> {
@@ -242,7 +242,41 @@ fn files_that_are_refused_by_place() {
         ("m.stl", stl(&facet("0 0 1", ["0 0 0", "1 0 0", "1 1 0\nvertex 0 1 0"])), ":7: a facet of more than three corners"),
         ("m.stl", stl("vertex 0 0 0\n"), ":2: `vertex 0 0 0` is out of place in an STL file"),
         ("m.stl", b"solid\nfacet normal 0 0 1\nvertex 1 1 1\n".to_vec(), ":3: the file ends within a facet"),
-        ("m.off", b"OFF".to_vec(), ": not a kind of mesh that is read; there are .obj, .ply, .stl"),
+        ("m.glb", b"".to_vec(), ": no faces: the file is empty"),
+        ("m.glb", b"{".to_vec(), ": no glTF: EOF while parsing an object at line 1 column 1"),
+        ("m.glb", cut(shape.glb(), 1), ": the file ends within a chunk"),
+        ("m.glb", b"glTF\x01\0\0\0".to_vec(), ": it is of version 1 of GLB"),
+        ("m.glb", b"glTF\x02\0\0\0\x0c\0\0\0".to_vec(), ": it has no JSON"),
+        ("m.gltf", gltf(&bare, "2.0", "1.0"), ": it is glTF \"1.0\"; version 2 is read"),
+        ("m.gltf", gltf(&bare, "\"scene\":0", "\"extensionsRequired\":[\"KHR_materials_unlit\",\"KHR_draco_mesh_compression\"]"), ": it requires the extension \"KHR_draco_mesh_compression\""),
+        ("m.gltf", gltf(&bare, "\"scene\":0", "\"extensionsRequired\":[\"EXT_meshopt_compression\"]"), ": it requires the extension \"EXT_meshopt_compression\""),
+        ("m.gltf", gltf(&bare, "{\"mesh\":0}", "{\"mesh\":9}"), ": node 0 has mesh 9: there are 1"),
+        ("m.gltf", gltf(&bare, "{\"mesh\":0}", "{\"mesh\":0,\"children\":[0]},{\"children\":[0]}"), ": node 0 is a child twice"),
+        ("m.gltf", gltf(&bare, "{\"mesh\":0}", "{\"mesh\":0,\"children\":[0]}"), ": node 0 is in the scene twice"),
+        ("m.gltf", gltf(&bare, "{\"mesh\":0}", "{\"children\":[7]}"), ": no node 7: there are 1"),
+        ("m.gltf", gltf(&bare, "{\"nodes\":[0]}", "{\"nodes\":[0,0]}"), ": node 0 is in the scene twice"),
+        ("m.gltf", gltf(&bare, "{\"nodes\":[0]}", "{\"nodes\":[3]}"), ": no node 3: there are 1"),
+        ("m.gltf", gltf(&bare, "{\"nodes\":[0]}", "{}"), ": no faces: no mesh with triangles in 1 node"),
+        ("m.gltf", gltf(&bare, "{\"mesh\":0}", "{\"mesh\":0,\"matrix\":[1,0,0,1,0,1,0,0,0,0,1,0,0,0,0,1]}"), ": node 0 has a matrix that is not affine"),
+        ("m.gltf", gltf(&bare, "\"scene\":0", "\"scene\":0"), ": buffer 0 is not in the file, and has no uri"),
+        ("m.glb", packed(&bare, "{\"mesh\":0}", "{\"mesh\":0,\"scale\":[1e300,1e300,1e300],\"children\":[1]},{\"mesh\":0,\"scale\":[1e300,1,1]}"), ": mesh 0, primitive 0: vertex 0 is not finite"),
+        ("m.gltf", gltf(&bare, "{\"mesh\":0}", "{\"mesh\":-1}"), ": no glTF: invalid value: integer `-1`, expected usize at line 1 column"),
+        ("m.glb", packed(&bare, "\"indices\":1", "\"indices\":5"), ": no accessor 5: there are 2"),
+        ("m.glb", packed(&bare, "\"indices\":1", "\"indices\":0"), ": accessor 0: it is VEC3 of component type 5126; expected SCALAR of a known type of indices"),
+        ("m.gltf", gltf(&bare, "\"VEC3\"", "\"VEC4\""), ": accessor 0: it is VEC4 of component type 5126; expected VEC3"),
+        ("m.gltf", gltf(&bare, "\"VEC3\"", "\"VEC3\",\"sparse\":{}"), ": accessor 0: it is sparse, which is not read"),
+        ("m.gltf", gltf(&bare, "\"bufferView\":0,", ""), ": accessor 0: it has no buffer view"),
+        ("m.gltf", gltf(&bare, "\"bufferView\":0,", "\"bufferView\":8,"), ": accessor 0: no buffer view 8"),
+        ("m.gltf", gltf(&bare, "\"count\":26", "\"count\":18446744073709551615"), ": accessor 0: it ends 18446744073709551615 bytes into buffer view 0, which has 312"),
+        ("m.gltf", gltf(&bare, "\"byteOffset\":0", "\"byteOffset\":0,\"byteStride\":4"), ": accessor 0: buffer view 0 has a stride of 4 bytes"),
+        ("m.gltf", gltf(&bare, "\"buffers\":[{", "\"buffers\":[{\"uri\":\"data:;base64,AA*A\","), ": the data of buffer 0 are no base64"),
+        ("m.gltf", gltf(&bare, "\"buffers\":[{", "\"buffers\":[{\"uri\":\"data:;base64,AAAA\","), ": accessor 0: buffer 0 ends before it, after 3 bytes"),
+        ("m.gltf", gltf(&bare, "\"buffers\":[{", "\"buffers\":[{\"uri\":\"https://x/y.bin\","), ": buffer 0 is elsewhere (https://x/y.bin)"),
+        ("m.glb", packed(&bare, "\"indices\"", "\"mode\":9,\"indices\""), ": mesh 0, primitive 0: mode 9 is not known"),
+        ("m.glb", packed(&bare, "\"count\":144", "\"count\":143"), ": mesh 0, primitive 0: 143 corners of triangles, which is no multiple of 3"),
+        ("m.glb", packed(&bare, "\"count\":26", "\"count\":20"), ": mesh 0, primitive 0: vertex number 2"),
+        ("m.glb", glb(&bare.gltf("").0, &[0xff; 4000]), ": mesh 0, primitive 0: vertex 0 is not finite"),
+        ("m.off", b"OFF".to_vec(), ": not a kind of mesh that is read; there are .obj, .ply, .stl, .gltf, .glb, each also with .gz"),
         ("m", b"v 0 0 0".to_vec(), ": not a kind of mesh that is read"),
         ("m.zip.gz", gzip(b"v 0 0 0"), ": not a kind of mesh that is read"),
     ];
@@ -268,6 +302,38 @@ fn files_that_are_refused_by_place() {
     }
 }
 
+#[test]
+fn buffers_of_gltf_may_be_files_beside_it() {
+    let shape = Shape::bulged(2);
+    let (json, bytes) = shape.gltf("\"uri\":\"my%20buffer.bin\",");
+    let (folder, path) = written("m.gltf", json.as_bytes());
+    let (message, kind) = failure(load_mesh(&path), "no buffer");
+    assert!(
+        kind == ErrorKind::File && message.contains("m.gltf: ") && message.contains("my buffer.bin: cannot read"),
+        "{message}"
+    );
+    std::fs::write(folder.path().join("my buffer.bin"), &bytes[1..]).unwrap();
+    let (message, kind) = failure(load_mesh(&path), "short buffer");
+    let length = bytes.len();
+    assert!(
+        kind == ErrorKind::Scene && message.contains(&format!("has {} bytes of {length}", length - 1)),
+        "{message}"
+    );
+    std::fs::write(folder.path().join("my buffer.bin"), &bytes).unwrap();
+    assert_eq!(bits(&load_mesh_with_uv(&path).unwrap()), bits(&read("m.glb", &shape.glb()).unwrap()));
+    // Whole numbers that stand for shares of 1, as quantized files have them, four bytes apart.
+    let bytes: Vec<u8> = [[0, 0, 0, 9], [127, 0, 0, 9], [0, 0x81, 0x80, 9]].concat();
+    let json = "{\"asset\":{\"version\":\"2.0\"},\"extensionsRequired\":[\"KHR_mesh_quantization\"],\"nodes\":[{\"mesh\":0}],\
+                \"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\
+                \"accessors\":[{\"bufferView\":0,\"componentType\":5120,\"normalized\":true,\"count\":3,\"type\":\"VEC3\"}],\
+                \"bufferViews\":[{\"buffer\":0,\"byteLength\":12,\"byteStride\":4}],\"buffers\":[{\"byteLength\":12}]}";
+    let mesh = read("m.glb", &glb(json, &bytes)).unwrap();
+    assert_eq!(
+        mesh.positions.iter().map(|p| p.to_array()).collect::<Vec<_>>(),
+        [[0.0; 3], [1.0, 0.0, 0.0], [0.0, -1.0, -1.0]]
+    );
+}
+
 /// What is accepted of damaged files is sound, and most damage is told.
 #[test]
 fn damaged_files_never_panic() {
@@ -280,6 +346,12 @@ fn damaged_files_never_panic() {
         ("m.stl", bare.stl_ascii()),
         ("m.stl", bare.stl_binary()),
         ("m.ply.gz", gzip(&shape.ply_binary(false))),
+        (
+            "m.obj",
+            [b"o first part\nusemtl a\n", &shape.obj()[..], b"g b c\nf 1/1 2 3//1\nusemtl d\nf -1 -2 -3\n"].concat(),
+        ),
+        ("m.glb", shape.glb()),
+        ("m.gltf", shape.gltf(&format!("\"uri\":\"data:;base64,{}\",", base64(&shape.gltf("").1))).0.into_bytes()),
     ];
     let folder = tempfile::tempdir().unwrap();
     for (number, (name, bytes)) in files.iter().enumerate() {
@@ -289,7 +361,11 @@ fn damaged_files_never_panic() {
             std::fs::write(&path, damaged(bytes, seed)).unwrap();
             let Ok(mesh) = load_mesh_with_uv(&path) else { continue };
             accepted += 1;
-            sound(&mesh, &format!("{name} {number} seed {seed}"));
+            let what = format!("{name} {number} seed {seed}");
+            sound(&mesh, &what);
+            for label in mesh.parts.labels() {
+                sound(&mesh.portion(|l| l == label), &what);
+            }
         }
         assert!((1..1900).contains(&accepted), "{name} {number}: {accepted} of 2000 accepted");
     }
@@ -306,146 +382,4 @@ fn sound(mesh: &RawMesh, what: &str) {
         assert!(normals.triangles.iter().flatten().flatten().all(|&i| i < n), "{what}");
     }
     assert_eq!(mesh.clone().with_smooth_normals().triangles, mesh.triangles, "{what}");
-}
-
-/// Two boxes of two materials each, as a modelling program exports them; a corner of the second is one of the first.
-const ROOM: &str = "mtllib room.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0.1\no Lamp Shade\ng Cloth wide\nusemtl Paper.001\nf 1 2 3\nusemtl Wire\nf 1 3 4\n\
-                    o Table\nv 3 0 0\nv 0 3 0\nusemtl Wood\ng Top\nf 1 5 6\nf 1 6 4\nusemtl Wire\ng Legs\nf 4 5 6\nf 2 1 5\n";
-
-/// A scene of the mesh file `name` in an object of these `keys`.
-fn scene(name: &str, bytes: &[u8], keys: &str) -> Result<Scene, Error> {
-    let (folder, _) = written(name, bytes);
-    let text = camera([0.0, 0.0, 30.0], [0.0; 3], 40.0, [8, 8])
-        + &format!("[[object]]\nname = \"set\"\nmesh = \"{name}\"\n{keys}\n")
-        + &["jade", "stone", "wood"].map(|name| parts::diffuse(name, 0.5)).concat()
-        + &sky(1.0);
-    Scene::load(&SceneFile::parse(&text, &folder.path().join("scene.toml"))?)
-}
-
-/// Triangles as the places of their corners.
-type Corners = Vec<[[f64; 3]; 3]>;
-
-/// For each object its name, its material and its triangles.
-fn objects(scene: &Scene) -> Vec<(String, String, Corners)> {
-    let of = |o: &marmor::scene::Object| {
-        let corner = |i: u32| (o.mesh.positions[i as usize] + scene.centre).to_array();
-        let triangles = o.mesh.triangles.iter().map(|t| t.map(corner)).collect();
-        (o.name.clone(), scene.materials[o.material].name.clone(), triangles)
-    };
-    scene.objects.iter().map(of).collect()
-}
-
-fn triangles(of: &[[usize; 3]]) -> Corners {
-    const AT: [[f64; 3]; 6] =
-        [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1], [3.0, 0.0, 0.0], [0.0, 3.0, 0.0]];
-    of.iter().map(|t| t.map(|i| AT[i - 1])).collect()
-}
-
-#[test]
-fn an_object_may_be_one_part_of_a_file() {
-    #[rustfmt::skip]
-    let cases: [(&str, &[[usize; 3]]); 7] = [
-        ("Lamp Shade", &[[1, 2, 3], [1, 3, 4]]),
-        ("Table", &[[1, 5, 6], [1, 6, 4], [4, 5, 6], [2, 1, 5]]),
-        ("Wire", &[[1, 3, 4], [4, 5, 6], [2, 1, 5]]),
-        ("Paper.001", &[[1, 2, 3]]),
-        ("Cloth", &[[1, 2, 3], [1, 3, 4]]),
-        ("wide", &[[1, 2, 3], [1, 3, 4]]),
-        ("Legs", &[[4, 5, 6], [2, 1, 5]]),
-    ];
-    for (part, expected) in cases {
-        let scene = scene("m.obj", ROOM.as_bytes(), &format!("part = \"{part}\"\nmaterial = \"wood\"")).unwrap();
-        // The world is about the middle of its box, in which positions are: those of the parts differ by rounding there alone.
-        let found = objects(&scene).remove(0);
-        assert_eq!((found.0.as_str(), found.1.as_str()), ("set", "wood"), "{part}");
-        assert_eq!(found.2, triangles(expected), "{part}");
-        assert!(!scene.warnings.iter().any(|w| w.contains("one object")), "{:?}", scene.warnings);
-    }
-}
-
-#[test]
-fn parts_of_a_file_may_have_materials_of_their_own() {
-    let keys = "materials = { Wire = \"stone\", \"Paper.001\" = \"jade\", Wood = \"wood\" }";
-    let all = scene("m.obj", ROOM.as_bytes(), keys).unwrap();
-    let expected: [(&str, &str, &[[usize; 3]]); 3] = [
-        ("set/Wire", "stone", &[[1, 3, 4], [4, 5, 6], [2, 1, 5]]),
-        ("set/Paper.001", "jade", &[[1, 2, 3]]),
-        ("set/Wood", "wood", &[[1, 5, 6], [1, 6, 4]]),
-    ];
-    let expected = expected.map(|(name, material, of)| (name.to_string(), material.to_string(), triangles(of)));
-    assert_eq!(objects(&all), expected);
-    // Corners that parts share are at one place, to the bit.
-    let one = |i: usize| all.objects[i].mesh.positions.iter().find(|p| (**p + all.centre).length() < 1e-9).unwrap();
-    assert_eq!([one(0), one(1)], [one(2); 2]);
-    let rest = scene("m.obj", ROOM.as_bytes(), "materials = { Wood = \"wood\", \"*\" = \"stone\" }").unwrap();
-    let names: Vec<_> = objects(&rest).into_iter().map(|(name, material, of)| (name, material, of.len())).collect();
-    assert_eq!(names, [("set/Wood".to_string(), "wood".to_string(), 2), ("set/*".to_string(), "stone".to_string(), 4)]);
-    // Without materials in the file, its objects and groups; faces before all names are of the rest.
-    let bare = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\no A\nf 1 3 2\no B\ng B\nf 2 3 1\n";
-    let of_objects = scene("m.obj", bare.as_bytes(), "materials = { B = \"wood\", \"*\" = \"jade\" }").unwrap();
-    let counts: Vec<_> = of_objects.objects.iter().map(|o| o.mesh.triangles.len()).collect();
-    assert_eq!(counts, [1, 2]);
-    assert!(all.warnings.iter().chain(&rest.warnings).all(|w| !w.contains("one object")));
-}
-
-/// A part is the same as a file of it alone: normals and texture coordinates too.
-#[test]
-fn a_part_is_as_a_file_of_its_own() {
-    let shape = Shape::bulged(3);
-    let cut = shape.faces.len() / 2;
-    let half = |faces: &[Vec<u32>]| Shape { faces: faces.to_vec(), ..shape.clone() };
-    let text = String::from_utf8(shape.obj()).unwrap();
-    let at = text.match_indices("\nf ").nth(cut).unwrap().0;
-    let both = text[..at].replacen("\nf ", "\nusemtl a\nf ", 1) + "\nusemtl b" + &text[at..];
-    let mesh = read("m.obj", both.as_bytes()).unwrap();
-    for (name, faces) in [("a", &shape.faces[..cut]), ("b", &shape.faces[cut..])] {
-        let part = mesh.portion(|label| label.material.as_deref() == Some(name));
-        assert_eq!(bits(&part), bits(&read("m.obj", &half(faces).obj()).unwrap()), "{name}");
-    }
-}
-
-#[test]
-fn several_parts_as_one_object_are_told_of_once() {
-    let said = |text: &str| {
-        let all = scene("m.obj", text.as_bytes(), "material = \"wood\"").unwrap().warnings;
-        all.into_iter().filter(|w| w.contains("are one object")).collect::<Vec<_>>()
-    };
-    let room = said(ROOM);
-    let words = "m.obj: its 3 materials (\"Paper.001\", \"Wire\", \"Wood\") are one object of the material \"wood\"; to take them apart, give \
-                 `materials = { \"Paper.001\" = \"wood\", \"*\" = \"wood\" }`, or `part = \"Paper.001\"`";
-    assert!(room.len() == 1 && room[0].contains(words), "{room:?}");
-    let objects = said(&ROOM.replace("usemtl Wire\n", "").replace("usemtl Wood\n", ""));
-    assert!(objects.len() == 1 && objects[0].contains("its 2 objects (\"Lamp Shade\", \"Table\") are"), "{objects:?}");
-    assert_eq!(
-        said("o a\ng b\nusemtl c\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\ng b\no d\nusemtl e\n"),
-        Vec::<String>::new()
-    );
-}
-
-#[test]
-fn parts_that_are_not_there_are_refused_by_name() {
-    let twice = ROOM.replace("g Legs", "g Wood");
-    let room = ROOM.as_bytes();
-    #[rustfmt::skip]
-    let cases: &[(&str, &[u8], &str, &str)] = &[
-        ("m.obj", room, "part = \"Tabel\"\nmaterial = \"wood\"", "m.obj: no part \"Tabel\" (did you mean `Table`?); there are the materials \"Paper.001\", \"Wire\", \"Wood\", the objects \"Lamp Shade\", \"Table\", the groups \"Cloth\", \"wide\", \"Top\", \"Legs\""),
-        ("m.obj", twice.as_bytes(), "part = \"Wood\"\nmaterial = \"wood\"", "\"Wood\" is the name of a material and of a group of other faces"),
-        ("m.obj", room, "materials = { Table = \"wood\", \"*\" = \"jade\" }", "no part \"Table\"; there are the materials \"Paper.001\", \"Wire\", \"Wood\""),
-        ("m.obj", room, "materials = { Wood = \"wood\" }", "`materials` has none for \"Paper.001\", \"Wire\"; name them, or give \"*\" one"),
-        ("m.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nusemtl a\nf 1 3 2\n", "materials = { a = \"wood\" }", "`materials` has none for 1 triangle without a name"),
-        ("m.obj", room, "materials = { Wood = \"wood\", Wire = \"wood\", \"Paper.001\" = \"wood\", \"*\" = \"jade\" }", "leaves none for \"*\"; remove it"),
-        ("m.obj", b"o a\ng b\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "materials = { a = \"wood\", b = \"wood\" }", "names some faces twice"),
-        ("m.obj", room, "materials = {}", "`object.0.materials` names no part"),
-        ("m.obj", room, "materials = { Wood = \"would\", \"*\" = \"jade\" }", "`object.0.materials` \"would\" does not exist (did you mean `wood`?)"),
-        ("m.obj", room, "materials = { Wood = 3 }", "`object.0.materials.Wood` is 3; expected the name of a [material.NAME]"),
-        ("m.obj", room, "material = \"jade\"\nmaterials = { Wood = \"wood\" }", "`object.0.material` stands beside `materials`"),
-        ("m.obj", room, "part = \"Wood\"\nmaterials = { Wood = \"wood\" }", "`object.0.part` stands beside `materials`"),
-        ("m.obj", room, "part = \"Wood\"", "`object.0.material` is missing"),
-        ("m.stl", &Shape::bulged(1).bare().stl_binary(), "part = \"Wood\"\nmaterial = \"wood\"", "m.stl: no part \"Wood\": the file has no parts; leave out the key"),
-        ("m.stl", &Shape::bulged(1).bare().stl_binary(), "materials = { Wood = \"wood\" }", "m.stl: no part \"Wood\": the file has no parts"),
-    ];
-    for (name, bytes, keys, words) in cases {
-        let (message, kind) = failure(scene(name, bytes, keys), keys);
-        assert!(message.contains(words) && kind == ErrorKind::Scene, "{keys}: {message}");
-    }
 }

@@ -1,6 +1,7 @@
 //! Faces over numbered vertices, as PLY, STL and glTF have them, on their way to a [`RawMesh`].
 
 use super::odd_polygons::OddPolygons;
+use super::parts::{Label, Labelled};
 use super::polygon::triangulate;
 use super::{CornerUv, RawMesh};
 use crate::math::DVec3;
@@ -23,6 +24,7 @@ pub(super) struct Builder {
     /// For each vertex its number in the mesh; [`UNUSED`] where it has none yet.
     numbers: Vec<u32>,
     mesh: RawMesh,
+    labelled: Labelled,
     odd: OddPolygons,
     corners: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
@@ -39,6 +41,7 @@ impl Builder {
             vertices: Vertices::default(),
             numbers: Vec::new(),
             mesh,
+            labelled: Labelled::default(),
             odd: OddPolygons::new(place),
             corners,
             triangles,
@@ -48,6 +51,11 @@ impl Builder {
     /// Triangles so far.
     pub(super) fn count(&self) -> usize {
         self.mesh.triangles.len()
+    }
+
+    /// What the next faces are called.
+    pub(super) fn label(&mut self, label: Label) {
+        self.labelled.change(|next| *next = label);
     }
 
     /// A face of three corners or more, which are there, at place number `place`; `uv` of its corners, or else its vertices' own.
@@ -76,6 +84,7 @@ impl Builder {
             self.odd.count(shape, place);
         }
         let before = self.mesh.triangles.len();
+        self.labelled.face(before);
         let number = |i: u32| self.numbers[corners[i as usize] as usize];
         self.mesh.triangles.extend(self.triangles.iter().map(|t| t.map(number)));
         if let Some(normals) = &mut self.mesh.normals {
@@ -101,6 +110,7 @@ impl Builder {
     /// The mesh, with what is odd about its polygons among its remarks.
     pub(super) fn finish(mut self) -> RawMesh {
         self.mesh.remarks.extend(self.odd.remarks());
+        self.mesh.parts = self.labelled.into_parts();
         if self.mesh.uv.as_ref().is_some_and(|uv| uv.iter().all(Option::is_none)) {
             self.mesh.uv = None;
         }

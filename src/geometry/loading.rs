@@ -43,3 +43,15 @@ impl Budget {
         memory::require(needed, memory::available(), &what, "use a coarser mesh")
     }
 }
+
+/// That there are `bytes` for a file and what is made of it.
+///
+/// # Errors
+/// Memory.
+pub(super) fn require_bytes(bytes: usize) -> Result<()> {
+    // Asking the system takes longer than reading a small file.
+    if bytes < 1 << 24 {
+        return Ok(());
+    }
+    memory::require(bytes as u128, memory::available(), "a mesh file that is read whole", "use a coarser mesh")
+}

@@ -4,13 +4,13 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use super::{RawMesh, obj, ply, stl};
+use super::{RawMesh, gltf, obj, ply, stl};
 use crate::error::{Error, Result};
 use crate::input;
 use flate2::bufread::MultiGzDecoder;
 
 /// The endings of the names of mesh files that are read; `.gz` may follow each.
-pub const MESH_ENDINGS: &[&str] = &["obj", "ply", "stl"];
+pub const MESH_ENDINGS: &[&str] = &["obj", "ply", "stl", "gltf", "glb"];
 
 /// Reads the triangles of a mesh file: all its parts joined, vertices shared between them, unused vertices left out. Polygons are
 /// cut into triangles, concave ones and those with a hole too. Texture coordinates (but see [`load_mesh_with_uv`]), colours and
@@ -47,6 +47,7 @@ fn load(path: &Path, uv: bool) -> Result<RawMesh> {
         "obj" => obj::read(source, path, uv),
         "ply" => ply::read(source, path, uv),
         "stl" => stl::read(source, path, uv),
+        "gltf" | "glb" => gltf::read(source, path, uv),
         _ => Err(Error::scene(format!(
             "{}: not a kind of mesh that is read; there are {}, each also with .gz after it",
             path.display(),

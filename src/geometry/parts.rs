@@ -164,4 +164,9 @@ impl Labelled {
     pub(super) fn labels(&self) -> &[Label] {
         &self.labels
     }
+
+    /// Of a mesh whose faces were numbered by their triangles.
+    pub(super) fn into_parts(self) -> Parts {
+        Parts::new(self.labels, self.runs)
+    }
 }

@@ -227,7 +227,7 @@ fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &RawMesh) -> Result<()> 
     };
     Err(Error::scene(format!(
         "{}: object {:?}: its material {:?} is a picture, but {without} of {} of {mesh} {} no texture coordinates; export them \
-         (at each corner of each face; STL has none), or give the object another material",
+         (`vt` of OBJ, at each corner of each face; STL has none), or give the object another material",
         entry.at,
         entry.name,
         material.name,

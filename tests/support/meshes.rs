@@ -1,6 +1,8 @@
-//! One mesh in every format that is read.
+//! One mesh in every format that is read, and files of it.
 #![allow(dead_code)] // each test file uses its part
 
+use marmor::Error;
+use marmor::geometry::{RawMesh, load_mesh_with_uv};
 use std::fmt::Write as _;
 
 /// Vertices with everything a format may have of them, each number one of f32, and polygons over them.
@@ -152,6 +154,77 @@ impl Shape {
         }
         out
     }
+
+    /// What a glTF file has in its buffer, and the JSON that says so: one node of one mesh; `buffer` is its entry. Faces become
+    /// fans of triangles.
+    pub fn gltf(&self, buffer: &str) -> (String, Vec<u8>) {
+        let fans: Vec<u32> =
+            self.faces.iter().flat_map(|f| (2..f.len()).flat_map(|i| [f[0], f[i - 1], f[i]])).collect();
+        let n = self.positions.len();
+        let (mut bytes, mut views, mut accessors, mut attributes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut add = |name: &str, kind: &str, component: u32, count: usize, own: Vec<u8>| {
+            let at = views.len();
+            views.push(format!("{{\"buffer\":0,\"byteOffset\":{},\"byteLength\":{}}}", bytes.len(), own.len()));
+            accessors.push(format!(
+                "{{\"bufferView\":{at},\"componentType\":{component},\"count\":{count},\"type\":\"{kind}\"}}"
+            ));
+            attributes.push(format!("\"{name}\":{at}"));
+            bytes.extend(own);
+        };
+        let floats = |all: Vec<f32>| all.iter().flat_map(|x| x.to_le_bytes()).collect();
+        add("POSITION", "VEC3", 5126, n, floats(self.positions.iter().flatten().copied().collect()));
+        if !self.normals.is_empty() {
+            add("NORMAL", "VEC3", 5126, n, floats(self.normals.iter().flatten().copied().collect()));
+        }
+        if !self.uv.is_empty() {
+            add("TEXCOORD_0", "VEC2", 5126, n, floats(self.uv.iter().flat_map(|[u, v]| [*u, 1.0 - v]).collect()));
+        }
+        add("", "SCALAR", 5125, fans.len(), fans.iter().flat_map(|i| i.to_le_bytes()).collect());
+        attributes.pop();
+        let json = format!(
+            "{{\"asset\":{{\"version\":\"2.0\"}},\"scene\":0,\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}],\
+             \"meshes\":[{{\"primitives\":[{{\"attributes\":{{{}}},\"indices\":{}}}]}}],\"accessors\":[{}],\
+             \"bufferViews\":[{}],\"buffers\":[{{{buffer}\"byteLength\":{}}}]}}",
+            attributes.join(","),
+            views.len() - 1,
+            accessors.join(","),
+            views.join(","),
+            bytes.len()
+        );
+        (json, bytes)
+    }
+
+    /// glTF in one piece.
+    pub fn glb(&self) -> Vec<u8> {
+        let (json, bytes) = self.gltf("");
+        glb(&json, &bytes)
+    }
+}
+
+/// A GLB file of these chunks.
+pub fn glb(json: &str, bytes: &[u8]) -> Vec<u8> {
+    let mut out = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
+    for (kind, chunk, blank) in [(b"JSON", json.as_bytes(), b' '), (b"BIN\0", bytes, 0)] {
+        out.extend((chunk.len().next_multiple_of(4) as u32).to_le_bytes());
+        out.extend(kind);
+        out.extend(chunk);
+        out.resize(out.len().next_multiple_of(4), blank);
+    }
+    let length = (out.len() as u32).to_le_bytes();
+    out[8..12].copy_from_slice(&length);
+    out
+}
+
+/// Bytes as base64.
+pub fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::new();
+    for three in bytes.chunks(3) {
+        let all = three.iter().enumerate().fold(0_u32, |all, (i, b)| all | u32::from(*b) << (16 - 8 * i));
+        (0..=three.len()).for_each(|i| out.push(LETTERS[(all >> (18 - 6 * i)) as usize % 64].into()));
+        out += &"=".repeat(3 - three.len());
+    }
+    out
 }
 
 /// The same bytes, packed.
@@ -160,4 +233,23 @@ pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     out.write_all(bytes).unwrap();
     out.finish().unwrap()
+}
+
+/// A folder with a file of this name, and its path.
+pub fn written(name: &str, bytes: &[u8]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    (folder, path)
+}
+
+/// The mesh that a file of this name is read as.
+pub fn read(name: &str, bytes: &[u8]) -> Result<RawMesh, Error> {
+    load_mesh_with_uv(&written(name, bytes).1)
+}
+
+/// Positions, triangles, normals and texture coordinates, to the bit.
+pub fn bits(mesh: &RawMesh) -> String {
+    let normals = mesh.normals.as_ref().map(|n| (&n.vectors, &n.triangles));
+    format!("{:?}", (&mesh.positions, &mesh.triangles, normals, &mesh.uv))
 }
