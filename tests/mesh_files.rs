@@ -383,3 +383,43 @@ fn sound(mesh: &RawMesh, what: &str) {
     }
     assert_eq!(mesh.clone().with_smooth_normals().triangles, mesh.triangles, "{what}");
 }
+
+/// A few kilobytes that unpack to more than there is end in the error that says so, and not by the system's hand.
+#[cfg(all(feature = "cli", target_os = "linux"))]
+#[test]
+fn what_gzip_blows_up_is_refused_before_memory_ends() {
+    let many = PLY
+        .replace("vertex 4", "vertex 4000000000")
+        .replace("ascii", "binary_little_endian")
+        .replace("double", "float");
+    let mut triangles = vec![0; 84];
+    triangles[80..].fill(0x7f);
+    let mut glb = b"glTF\x02\0\0\0\0\0\0\0".to_vec();
+    glb.extend([0, 0, 0, 8]);
+    glb.extend(b"JSON");
+    type Piece = fn(usize) -> Vec<u8>;
+    #[rustfmt::skip]
+    let cases: [(&str, Vec<u8>, Piece, usize); 6] = [
+        ("m.obj.gz", Vec::new(), |_| b"v 0 0 0\n".repeat(512), 1 << 13),
+        ("names.obj.gz", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), |i| format!("g {i:016000}\nf 1 2 3\n").into_bytes(), 12_000),
+        ("m.ply.gz", many.into_bytes(), |_| vec![0; 1 << 12], 1 << 14),
+        ("m.stl.gz", triangles, |_| vec![0; 1 << 16], 1 << 12),
+        ("m.gltf.gz", b"{\"asset\":{\"version\":\"2.0\"},\"nodes\":[".to_vec(), |_| b"{},".repeat(1 << 14), 1 << 8),
+        ("m.glb.gz", glb, |_| vec![b' '; 1 << 16], 1 << 12),
+    ];
+    for (name, head, piece, times) in cases {
+        let (folder, path) = written(name, &[]);
+        let mut out = flate2::write::GzEncoder::new(std::fs::File::create(&path).unwrap(), flate2::Compression::fast());
+        std::io::Write::write_all(&mut out, &head).unwrap();
+        (0..times).for_each(|i| std::io::Write::write_all(&mut out, &piece(i)).unwrap());
+        out.finish().unwrap();
+        let scene =
+            camera([0.0, 6.0, 30.0], [0.0; 3], 40.0, [8, 8]) + &mesh("body", name, "wax") + &parts::diffuse("wax", 0.5);
+        std::fs::write(folder.path().join("scene.toml"), scene).unwrap();
+        let line = format!("ulimit -v 500000; exec {} check scene.toml", env!("CARGO_BIN_EXE_marmor"));
+        let output = std::process::Command::new("sh").current_dir(folder.path()).args(["-c", &line]).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(6), "{name}: {said}");
+        assert!(said.contains(name) && said.contains("GB") && said.contains("use a coarser mesh"), "{name}: {said}");
+    }
+}

@@ -154,6 +154,26 @@ fn parts_that_are_not_there_are_refused_by_name() {
     }
 }
 
+/// What is wrong with later objects is told at their own place, though parts are more objects than the file has entries.
+#[test]
+fn objects_after_parts_keep_their_place() {
+    let later = "[[object]]\nname = \"b\"\nmesh = \"m.obj\"\nmaterial = \"wood\"\n\
+                 [[object]]\nmesh = \"m.obj\"\nmaterial = \"wax\"\nbody = \"b\"\n\
+                 [[object]]\nmesh = \"m.obj\"\nmaterial = \"wax\"\nbody = \"b\"\n[material.wax]\ntype = \"dielectric\"\neta = 1.5\n";
+    let keys = "materials = { Wire = \"stone\", \"Paper.001\" = \"jade\", Wood = \"wood\" }\n";
+    let (message, _) = failure(scene("m.obj", ROOM.as_bytes(), &format!("{keys}{later}")), later);
+    assert!(
+        message.contains(":22: `object.3.body` \"b\" is the name of an object that is not part of it"),
+        "{message}"
+    );
+    let taken = "[[object]]\nname = \"set/Wood\"\nmesh = \"m.obj\"\nmaterial = \"wood\"\n";
+    let (message, _) = failure(scene("m.obj", ROOM.as_bytes(), &format!("{keys}{taken}")), taken);
+    assert!(message.contains("`object.1.name` \"set/Wood\" is taken"), "{message}");
+    let ball = "material = \"wood\"\n[[object]]\nshape = \"sphere\"\ncentre = [0, 0, 0]\nradius = 1\nmaterials = { a = \"wood\" }\n";
+    let (message, _) = failure(scene("m.obj", ROOM.as_bytes(), ball), ball);
+    assert!(message.contains("`object.1.materials` is of mesh files, and a `shape` has no parts"), "{message}");
+}
+
 /// Two nodes of one mesh of a triangle, the first below another, the second mirrored; besides a strip, a fan and lines.
 #[test]
 fn nodes_of_gltf_place_their_meshes() {
