@@ -403,7 +403,7 @@ fn what_gzip_blows_up_is_refused_before_memory_ends() {
         ("m.obj.gz", Vec::new(), |_| b"v 0 0 0\n".repeat(512), 1 << 13),
         ("names.obj.gz", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n".to_vec(), |i| format!("g {i:016000}\nf 1 2 3\n").into_bytes(), 12_000),
         ("m.ply.gz", many.into_bytes(), |_| vec![0; 1 << 12], 1 << 14),
-        ("m.stl.gz", triangles, |_| vec![0; 1 << 16], 1 << 12),
+        ("m.stl.gz", triangles, |_| vec![0; 1 << 16], 1 << 11),
         ("m.gltf.gz", b"{\"asset\":{\"version\":\"2.0\"},\"nodes\":[".to_vec(), |_| b"{},".repeat(1 << 14), 1 << 8),
         ("m.glb.gz", glb, |_| vec![b' '; 1 << 16], 1 << 12),
     ];

@@ -109,6 +109,15 @@ impl Builder {
 
     /// The mesh, with what is odd about its polygons among its remarks.
     pub(super) fn finish(mut self) -> RawMesh {
+        drop(self.vertices);
+        drop(self.numbers);
+        // Lists that grew may have twice the place that they need.
+        self.mesh.positions.shrink_to_fit();
+        self.mesh.triangles.shrink_to_fit();
+        if let Some(normals) = &mut self.mesh.normals {
+            normals.vectors.shrink_to_fit();
+            normals.triangles.shrink_to_fit();
+        }
         self.mesh.remarks.extend(self.odd.remarks());
         self.mesh.parts = self.labelled.into_parts();
         if self.mesh.uv.as_ref().is_some_and(|uv| uv.iter().all(Option::is_none)) {

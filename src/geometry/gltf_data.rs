@@ -152,16 +152,14 @@ impl<'a> Data<'a> {
         }
         let is_scheme = |s: &str| s.len() > 1 && s.bytes().all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b));
         if uri.split_once(':').is_some_and(|(scheme, _)| is_scheme(scheme)) {
-            let what = format_args!("buffer {index} is elsewhere ({}); save it as a file beside it", super::shown(uri))
-                .to_string();
-            return Err(self.wrong(what));
+            let at = super::shown(uri);
+            return Err(self.wrong(format!("buffer {index} is elsewhere ({at}); save it as a file beside it")));
         }
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let bytes = input::read_all(&folder.join(unescaped(uri)), 3).map_err(|e| e.within(self.path.display()))?;
         if (bytes.len() as u64) < length {
-            let what =
-                format_args!("{:?} has {} bytes of {length}; copy or export it again", uri, bytes.len()).to_string();
-            return Err(self.wrong(what));
+            let n = bytes.len();
+            return Err(self.wrong(format!("{uri:?} has {n} bytes of {length}; copy or export it again")));
         }
         Ok(bytes)
     }

@@ -1,5 +1,5 @@
 //! Triangle meshes and points on them. Not for: materials, rays (`query`).
-//! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area.
+//! Read first: `mesh.rs`; then `area_table.rs`, which picks points with equal chance per area, and `mesh_file.rs`, where files are read.
 
 mod area_table;
 mod box_tree;

@@ -19,7 +19,7 @@ pub struct RawMesh {
     pub uv: Option<Vec<Option<CornerUv>>>,
     /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
     pub groups: Vec<u32>,
-    /// What its file calls its triangles; said of them in the order of the file.
+    /// What its file calls its triangles; empty where nobody asks for parts, and after anything that numbers triangles anew.
     pub parts: Parts,
     /// What a user should hear of: what the file has besides, and what is odd about its polygons.
     pub remarks: Vec<String>,

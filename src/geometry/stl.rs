@@ -71,17 +71,15 @@ impl Stl<'_> {
     fn binary(&mut self) -> Result<()> {
         let mut head = [0; 84];
         if !self.file.fill(&mut head)? {
-            return Err(self
-                .file
-                .wrong("the file is shorter than the 84 bytes before the first triangle; is it an STL file?"));
+            let what = "the file is shorter than the 84 bytes before the first triangle; is it an STL file?";
+            return Err(self.file.wrong(what));
         }
         let count = u32::from_le_bytes([head[80], head[81], head[82], head[83]]);
         let mut record = [0; 50];
         for i in 0..count {
             if !self.file.fill(&mut record)? {
-                let of =
-                    format_args!("the file ends after {i} of {count} triangles (byte {})", self.file.at()).to_string();
-                return Err(self.file.wrong(format_args!("{of}; copy or export it again")));
+                let of = format!("the file ends after {i} of {count} triangles (byte {})", self.file.at());
+                return Err(self.file.wrong(format!("{of}; copy or export it again")));
             }
             let number = |at: usize| {
                 let b = 4 * at;
@@ -90,8 +88,8 @@ impl Stl<'_> {
             let [normal, a, b, c] = [0, 3, 6, 9].map(|at| DVec3::new(number(at), number(at + 1), number(at + 2)));
             if ![a, b, c].iter().all(|p| p.is_finite()) {
                 let at = self.file.at();
-                let what = format_args!("triangle {i} (before byte {at}) has a corner that is not finite").to_string();
-                return Err(self.file.wrong(format_args!("{what}; mend it or export again")));
+                let what = format!("triangle {i} (before byte {at}) has a corner that is not finite");
+                return Err(self.file.wrong(format!("{what}; mend it or export again")));
             }
             self.triangle(Some(normal), [a, b, c], i as usize)?;
         }

@@ -1,6 +1,6 @@
 //! The file as typed, and the checked world made from it: camera, materials, meshes, units.
 //! Not for: rays, light transport. Read first: `file.rs`, `objects.rs`, `materials.rs`, `options.rs` (what can be typed;
-//! `tree.rs` remembers the lines, `difference.rs` names them), `world.rs` (what the renderer sees),
+//! `tree.rs` remembers the lines, `difference.rs` names them; `portion.rs` has parts of mesh files), `world.rs` (what the renderer sees),
 //! `load.rs` (the way from one to the other).
 
 mod body;
