@@ -18,7 +18,7 @@ use marmor::bssrdf::{Bssrdf, Exit, ModelName, ModelOptions};
 use marmor::cache::{
     Cache, CacheBuilder, CachedBody, Density, Detail, Directions, Envelope, Gatherer, Scratch, Tuning,
 };
-use marmor::geometry::{AreaTable, load_obj};
+use marmor::geometry::{AreaTable, load_mesh};
 use marmor::light::Lights;
 use marmor::math::{DVec3, Rgb, hash};
 use marmor::optics::Medium;
@@ -40,7 +40,7 @@ fn scene() -> (Scene, tempfile::TempDir) {
     let object = match std::env::var("MARMOR_BENCH_OBJ") {
         Ok(path) => {
             std::fs::copy(&path, folder.path().join("mesh.obj")).unwrap();
-            let mesh = load_obj(path.as_ref()).unwrap();
+            let mesh = load_mesh(path.as_ref()).unwrap();
             let bounds = mesh.bounds().unwrap();
             let scale = 100.0 / bounds.extent().max_element();
             let [x, y, z] = (-scale * bounds.centre()).to_array();

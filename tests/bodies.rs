@@ -7,7 +7,7 @@ mod rendering;
 #[allow(dead_code)] // this file uses its part
 mod test_shapes;
 
-use marmor::geometry::{ObjMesh, sphere};
+use marmor::geometry::{RawMesh, sphere};
 use marmor::integrator::{AmbientOcclusion, Integrator, Subsurface, SubsurfaceOptions, VolumePath, VolumePathOptions};
 use marmor::math::DVec3;
 use marmor::scene::{MethodName, Scene, SceneFile};
@@ -15,7 +15,7 @@ use rendering::{Within, agree, average, film, load_in, mean_of};
 use test_shapes::{cuboid, joined};
 
 /// OBJ text without normals.
-fn obj(mesh: &ObjMesh) -> String {
+fn obj(mesh: &RawMesh) -> String {
     let mut text: String = mesh.positions.iter().map(|p| format!("v {} {} {}\n", p.x, p.y, p.z)).collect();
     for [a, b, c] in &mesh.triangles {
         text += &format!("f {} {} {}\n", a + 1, b + 1, c + 1);
@@ -24,7 +24,7 @@ fn obj(mesh: &ObjMesh) -> String {
 }
 
 /// Half of a ball of radius 1, above or below; closed by a disk or open. The disks of the two have other triangles.
-fn half_ball(above: bool, closed: bool) -> ObjMesh {
+fn half_ball(above: bool, closed: bool) -> RawMesh {
     let whole = sphere(DVec3::ZERO, 1.0, 24, 48);
     let is_half = |t: &&[u32; 3]| {
         let y: f64 = t.iter().map(|&i| whole.positions[i as usize].y).sum();
@@ -51,15 +51,15 @@ fn half_ball(above: bool, closed: bool) -> ObjMesh {
             triangles.extend((1..rim.len() - 1).map(|k| wound([rim[0], rim[k], rim[k + 1]])));
         }
     }
-    ObjMesh { positions, triangles, ..ObjMesh::default() }
+    RawMesh { positions, triangles, ..RawMesh::default() }
 }
 
 /// The whole, with the same equator.
-fn ball() -> ObjMesh {
+fn ball() -> RawMesh {
     joined(half_ball(true, false), &half_ball(false, false))
 }
 
-fn cube(x: f64, half: f64, n: u32) -> ObjMesh {
+fn cube(x: f64, half: f64, n: u32) -> RawMesh {
     cuboid(DVec3::new(x, 0.0, 0.0), DVec3::splat(half), n, n.is_multiple_of(2))
 }
 
@@ -73,7 +73,7 @@ const LAMP: &str = "[[object]]\nname = \"lamp\"\nshape = \"rectangle\"\ncentre =
 const BELOW: &str = "[camera]\nposition = [0.5, -3, 8]\nlook_at = [0.4, -0.3, 0]\nfov = 17\nresolution = [12, 12]\n";
 
 /// A scene of these parts, each with more keys.
-fn text(meshes: &[ObjMesh], keys: &str, rest: &str) -> (tempfile::TempDir, String) {
+fn text(meshes: &[RawMesh], keys: &str, rest: &str) -> (tempfile::TempDir, String) {
     let folder = tempfile::tempdir().unwrap();
     let mut text = format!("unit = \"mm\"\n{rest}\n");
     for (i, mesh) in meshes.iter().enumerate() {
@@ -83,7 +83,7 @@ fn text(meshes: &[ObjMesh], keys: &str, rest: &str) -> (tempfile::TempDir, Strin
     (folder, text)
 }
 
-fn scene(meshes: &[ObjMesh], keys: &str, rest: &str) -> Scene {
+fn scene(meshes: &[RawMesh], keys: &str, rest: &str) -> Scene {
     let (folder, text) = text(meshes, keys, rest);
     load_in(folder.path(), &text)
 }
@@ -133,7 +133,7 @@ fn lit(more: &str) -> String {
 }
 
 /// Sets of parts, and the one mesh that they are together.
-fn cases() -> Vec<(&'static str, Vec<ObjMesh>, ObjMesh)> {
+fn cases() -> Vec<(&'static str, Vec<RawMesh>, RawMesh)> {
     let halves = |closed| vec![half_ball(true, closed), half_ball(false, closed)];
     let long = cuboid(DVec3::new(0.5, 0.0, 0.0), DVec3::new(1.5, 1.0, 1.0), 1, false);
     vec![

@@ -121,7 +121,7 @@ fn every_estimator_paints_the_lotus_as_the_sum_over_all_samples_does() {
 #[ignore = "minutes, and a mesh that is not ours"]
 fn every_estimator_paints_a_given_mesh_as_the_sum_over_all_samples_does() {
     let path = std::path::PathBuf::from(std::env::var("MARMOR_BENCH_OBJ").expect("MARMOR_BENCH_OBJ names a mesh"));
-    let bounds = marmor::geometry::load_obj(&path).unwrap().bounds().unwrap();
+    let bounds = marmor::geometry::load_mesh(&path).unwrap().bounds().unwrap();
     let scale = 100.0 / bounds.extent().max_element();
     let [x, y, z] = (-scale * bounds.centre()).to_array();
     let mut scene = load_in(

@@ -12,15 +12,18 @@ use marmor::bssrdf::{ModelName, ModelOptions, WidthFit};
 use marmor::film::{
     Checkpoint, FilePicture, Film, Identity, Image, Metadata, PngOptions, Window, read_attributes, save,
 };
-use marmor::geometry::{examine, load_obj_with_uv, mended};
+use marmor::geometry::{examine, load_mesh_with_uv, mended};
 use marmor::integrator::{Direct, Subsurface, SubsurfaceOptions};
 use marmor::math::{DVec3, Rgb, hash};
 use marmor::report::{Batch, BatchOptions};
 use marmor::scene::{Estimator, Scene, SceneFile};
+use meshes::{Shape, base64};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+#[path = "support/meshes.rs"]
+mod meshes;
 mod rendering;
 
 /// No input of a few kilobytes may take longer, in the suite's build too.
@@ -271,16 +274,40 @@ fn obj() {
     // A plate with a bridged hole, and a soup of triangles whose corners lie a little apart.
     let plate = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\nv 1 1 0\nv 1 3 0\nv 3 3 0\nv 3 1 0\nvn 0 0 1\nf 1//1 2//1 3//1 4//1 1//1 5//1 6//1 7//1 8//1 5//1\rf 4 6 7 8 3\n";
     let soup = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1.00001 0 0\nv 1 1 0\nv 0 0.99999 0\nf -3 -2 -1\nv 0 0 0\nv 0 1 1e-5\nv -1 0 0\nf -3 -2 -1\n";
-    fuzz("obj", &lines(&[cube, colours, plate, soup]), |bytes, folder| {
-        let path = folder.join("m.obj");
-        std::fs::write(&path, bytes).unwrap();
-        let Ok(mesh) = load_obj_with_uv(&path) else { return false };
-        let _ = mesh.without_uv();
-        examine(&mesh.recentred(DVec3::ZERO));
-        let (mesh, _) = mended(mesh);
-        examine(&mesh.with_smooth_normals().recentred(DVec3::ONE));
-        true
-    });
+    let seeds = lines(&[cube, colours, plate, soup]);
+    fuzz("obj", &seeds, |bytes, folder| mesh(&folder.join("m.obj"), bytes));
+}
+
+fn mesh(path: &Path, bytes: &[u8]) -> bool {
+    std::fs::write(path, bytes).unwrap();
+    let Ok(mesh) = load_mesh_with_uv(path) else { return false };
+    let _ = mesh.without_uv();
+    examine(&mesh.recentred(DVec3::ZERO));
+    mesh.parts.labels().iter().for_each(|label| drop(mesh.portion(|l| l == label)));
+    let (mesh, _) = mended(mesh);
+    examine(&mesh.with_smooth_normals().recentred(DVec3::ONE));
+    true
+}
+
+#[test]
+fn ply() {
+    let shape = Shape::bulged(1);
+    let seeds = [shape.ply_ascii(), shape.ply_binary(false), shape.ply_binary(true)];
+    fuzz("ply", &seeds, |bytes, folder| mesh(&folder.join("m.ply"), bytes));
+}
+
+#[test]
+fn stl() {
+    let bare = Shape::bulged(1).bare();
+    fuzz("stl", &[bare.stl_ascii(), bare.stl_binary()], |bytes, folder| mesh(&folder.join("m.stl"), bytes));
+}
+
+#[test]
+fn gltf() {
+    let shape = Shape::bulged(1);
+    let data = format!("\"uri\":\"data:;base64,{}\",", base64(&shape.gltf("").1));
+    let seeds = [shape.glb(), shape.gltf(&data).0.into_bytes()];
+    fuzz("gltf", &seeds, |bytes, folder| mesh(&folder.join("m.glb"), bytes));
 }
 
 #[test]

@@ -7,7 +7,7 @@ mod rendering;
 #[path = "../src/geometry/test_shapes.rs"]
 mod shapes;
 
-use marmor::geometry::{ObjMesh, write_obj};
+use marmor::geometry::{RawMesh, write_obj};
 use marmor::integrator::{View, VolumePath, VolumePathOptions, traceable};
 use marmor::math::{DAffine3, DVec3, hash, unit_f64};
 use marmor::query::{self, Backend};
@@ -40,8 +40,8 @@ impl Dice {
     }
 }
 
-fn torus(large: f64, small: f64, n: u32) -> ObjMesh {
-    let mut mesh = ObjMesh::default();
+fn torus(large: f64, small: f64, n: u32) -> RawMesh {
+    let mut mesh = RawMesh::default();
     for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
         let [u, v] = [i, j].map(|k| std::f64::consts::TAU * f64::from(k) / f64::from(n));
         let r = large + small * v.cos();
@@ -55,7 +55,7 @@ fn torus(large: f64, small: f64, n: u32) -> ObjMesh {
 /// A body in its own place, the radius of a ball around it, and half its edges if it is a box.
 #[derive(Clone)]
 struct Body {
-    mesh: ObjMesh,
+    mesh: RawMesh,
     centre: DVec3,
     radius: f64,
     half: Option<DVec3>,

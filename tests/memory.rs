@@ -6,7 +6,7 @@ mod command;
 
 use command::{ball, marmor, text};
 use marmor::film::{Image, Metadata, save};
-use marmor::geometry::{ObjMesh, sphere_uv, write_obj};
+use marmor::geometry::{RawMesh, sphere_uv, write_obj};
 use marmor::math::{DVec3, Rgb};
 use marmor::query::Backend;
 use std::fs;
@@ -44,11 +44,11 @@ fn what_is_told_is_what_is_taken() {
     let fine = ["-D", "object.0.rings=256", "-D", "object.0.segments=512"];
     // Read from files, with corners in common and without, with normals and without.
     let ball = marmor::geometry::sphere(DVec3::ZERO, 1.0, 300, 600);
-    let with_uv = ObjMesh { uv: Some(sphere_uv(300, 600)), ..ball.clone() };
-    let bare = ObjMesh { normals: None, ..ball.clone() };
+    let with_uv = RawMesh { uv: Some(sphere_uv(300, 600)), ..ball.clone() };
+    let bare = RawMesh { normals: None, ..ball.clone() };
     let corners = ball.triangles.iter().flatten().map(|&i| ball.positions[i as usize]).collect();
     let apart = (0..ball.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-    let soup = ObjMesh { positions: corners, triangles: apart, ..ObjMesh::default() };
+    let soup = RawMesh { positions: corners, triangles: apart, ..RawMesh::default() };
     let text = fs::read_to_string(folder.join("scene.toml")).unwrap();
     for (name, mesh) in [("ball", &ball), ("bare", &bare), ("soup", &soup), ("with_uv", &with_uv)] {
         let mut file = fs::File::create(folder.join(format!("{name}.obj"))).unwrap();

@@ -3,16 +3,16 @@
 
 mod refusals;
 
-use marmor::geometry::{ObjMesh, load_obj};
+use marmor::geometry::{RawMesh, load_mesh};
 use marmor::math::DVec3;
 use marmor::{Error, ErrorKind};
 use refusals::{damaged, failure};
 
-fn obj(text: &[u8]) -> Result<ObjMesh, Error> {
+fn obj(text: &[u8]) -> Result<RawMesh, Error> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("m.obj");
     std::fs::write(&path, text).unwrap();
-    load_obj(&path)
+    load_mesh(&path)
 }
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n";
@@ -155,9 +155,9 @@ fn obj_files_that_are_refused_by_line() {
     let (message, _) = failure(obj(&vec![b'v'; (1 << 24) + 2]), "a line of 16 MiB");
     assert!(message.contains(":1: a line of more than 16 MiB"), "{message}");
     let folder = tempfile::tempdir().unwrap();
-    let (message, kind) = failure(load_obj(folder.path()), "a folder");
+    let (message, kind) = failure(load_mesh(folder.path()), "a folder");
     assert!(kind == ErrorKind::File && message.contains("it is a folder"), "{message}");
-    let (message, kind) = failure(load_obj(&folder.path().join("no.obj")), "missing");
+    let (message, kind) = failure(load_mesh(&folder.path().join("no.obj")), "missing");
     assert!(kind == ErrorKind::File && message.contains("no.obj: cannot read"), "{message}");
 }
 

@@ -260,7 +260,7 @@ fn the_scenes_of_the_documentation_are_read() {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scene-format.md")).unwrap();
     let parts = text.split("```toml\n").skip(1).filter_map(|part| part.split("```").next());
     let scenes: Vec<&str> = parts.filter(|part| part.contains("[camera]")).collect();
-    assert_eq!(scenes.len(), 5);
+    assert_eq!(scenes.len(), 6);
     for scene in scenes {
         let file = parse(scene).unwrap_or_else(|e| panic!("{e}\n{scene}"));
         if !scene.contains("mesh = ") {

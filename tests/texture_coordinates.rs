@@ -1,7 +1,7 @@
 //! Texture coordinates of meshes: read, written, and kept whatever is done to a mesh.
 #![allow(clippy::unwrap_used)] // a test that cannot write its files has failed
 
-use marmor::geometry::{ObjMesh, load_obj_with_uv, mended, sphere, write_obj};
+use marmor::geometry::{RawMesh, load_mesh_with_uv, mended, sphere, write_obj};
 use marmor::math::{DAffine3, DVec3};
 
 /// Whatever is done to a mesh, a corner keeps its coordinates: here they are its place.
@@ -13,7 +13,7 @@ fn corners_keep_their_coordinates() {
         mesh.uv = Some(mesh.triangles.iter().map(|t| Some(t.map(of))).collect());
         mesh
     };
-    let holds = |mesh: &ObjMesh, what: &str| {
+    let holds = |mesh: &RawMesh, what: &str| {
         assert_eq!((mesh.uv.as_ref().unwrap().len(), mesh.without_uv()), (mesh.triangles.len(), 0), "{what}");
         let mesh = mesh.recentred(DVec3::ZERO);
         for t in 0..mesh.triangles.len() as u32 {
@@ -26,7 +26,7 @@ fn corners_keep_their_coordinates() {
     holds(&ball(0.0).flipped(), "flipped");
     holds(&ball(0.0).with_smooth_normals(), "smooth");
     holds(&ball(0.0).placed(DAffine3::from_scale(DVec3::new(1.0, 1.0, -3.0))), "mirrored");
-    holds(&ObjMesh::joined(vec![(ball(0.0), true), (ball(5.0), false)]), "joined");
+    holds(&RawMesh::joined(vec![(ball(0.0), true), (ball(5.0), false)]), "joined");
     // Some faces turned, one twice, one without area.
     let mut odd = ball(0.0);
     for t in [3, 17, 40] {
@@ -34,7 +34,7 @@ fn corners_keep_their_coordinates() {
         odd.normals.as_mut().unwrap().triangles[t].as_mut().unwrap().swap(1, 2);
         odd.uv.as_mut().unwrap()[t].as_mut().unwrap().swap(1, 2);
     }
-    let push = |mesh: &mut ObjMesh, t: usize, corners: [usize; 3]| {
+    let push = |mesh: &mut RawMesh, t: usize, corners: [usize; 3]| {
         let (triangle, normals) = (mesh.triangles[t], mesh.normals.as_ref().unwrap().triangles[t]);
         let uv = mesh.uv.as_ref().unwrap()[t];
         mesh.triangles.insert(2, corners.map(|k| triangle[k]));
@@ -47,11 +47,11 @@ fn corners_keep_their_coordinates() {
     assert_eq!((done.turned, done.duplicates, done.zero_area), (3, 1, 1));
     holds(&whole, "mended");
     // Joined with one that has none.
-    let bare = ObjMesh { uv: None, ..ball(5.0) };
+    let bare = RawMesh { uv: None, ..ball(5.0) };
     for parts in [[ball(0.0), bare.clone()], [bare.clone(), ball(0.0)]] {
         let first = parts[0].uv.is_some();
         let n = bare.triangles.len();
-        let joined = ObjMesh::joined(parts.map(|mesh| (mesh, true)).to_vec());
+        let joined = RawMesh::joined(parts.map(|mesh| (mesh, true)).to_vec());
         assert_eq!((joined.without_uv(), joined.uv.as_ref().unwrap()[0].is_some()), (n, first));
         assert_eq!(joined.uv.unwrap().len(), 2 * n);
     }
@@ -62,10 +62,10 @@ fn corners_keep_their_coordinates() {
     mesh.uv.as_mut().unwrap()[7] = None;
     mesh.normals.as_mut().unwrap().triangles[9] = None;
     write_obj(&mesh, &mut std::fs::File::create(&path).unwrap()).unwrap();
-    let read = load_obj_with_uv(&path).unwrap();
+    let read = load_mesh_with_uv(&path).unwrap();
     // Corners have other numbers there.
     let places =
-        |mesh: &ObjMesh| mesh.triangles.iter().flatten().map(|&i| mesh.positions[i as usize]).collect::<Vec<_>>();
+        |mesh: &RawMesh| mesh.triangles.iter().flatten().map(|&i| mesh.positions[i as usize]).collect::<Vec<_>>();
     assert!(read.uv == mesh.uv && places(&read) == places(&mesh));
 }
 
@@ -76,7 +76,7 @@ fn coordinates_of_obj_files() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("m.obj");
         std::fs::write(&path, format!("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n{text}")).unwrap();
-        load_obj_with_uv(&path).unwrap()
+        load_mesh_with_uv(&path).unwrap()
     };
     let square = "vt 0 0\nvt 0.5 0 # half\nvt 0.5 1 7\nvt 0 1\n";
     let half = Some(vec![Some([[0.0, 0.0], [0.5, 0.0], [0.5, 1.0]]), Some([[0.0, 0.0], [0.5, 1.0], [0.0, 1.0]])]);

@@ -6,7 +6,7 @@ mod rendering;
 
 use marmor::ErrorKind;
 use marmor::film::{FilePicture, Image, Metadata, Window, save};
-use marmor::geometry::{examine, load_obj, load_obj_with_uv};
+use marmor::geometry::{examine, load_mesh, load_mesh_with_uv};
 use marmor::integrator::{
     Direct, Integrator, Path as Paths, Subsurface, SubsurfaceOptions, View, VolumePath, VolumePathOptions,
 };
@@ -354,11 +354,11 @@ fn coordinates_break_no_body() {
     let render = |scene: &Scene| film(&subsurface(scene, 2), scene, 2, 1, &mut []).image();
     assert_eq!(render(&bare), render(&with));
     // With them it is as closed.
-    let mesh = load_obj_with_uv(&path("with.obj")).unwrap();
+    let mesh = load_mesh_with_uv(&path("with.obj")).unwrap();
     assert_eq!(mesh.without_uv(), 0);
     let found = examine(&mesh.recentred(DVec3::ZERO));
     assert!(found.open_edges == 0 && (found.volume.unwrap() - 8.0).abs() < 1e-9, "{found:?}");
-    assert!(load_obj(&path("with.obj")).unwrap().uv.is_none());
+    assert!(load_mesh(&path("with.obj")).unwrap().uv.is_none());
 }
 
 /// What a scene with a picture is refused for: what is typed for the albedo, or in place of what.

@@ -6,11 +6,11 @@ use super::need;
 use super::setup::{MethodArgs, prepare};
 use marmor::Result;
 use marmor::film::{Window, check_replaceable, write_atomically};
-use marmor::geometry::{Mended, load_obj_with_uv, mended, write_obj};
+use marmor::geometry::{Mended, mended, write_obj};
 use marmor::integrator::{Integrator as _, TOLERANCE, View};
 use marmor::math::Rgb;
 use marmor::optics::{ChannelOptics, HalfSpace, Medium};
-use marmor::scene::{Emission, FilterName, Geometry, Object, Projection, Scene, SceneFile, Surface, Translucent};
+use marmor::scene::{Emission, FilterName, Object, Projection, Scene, SceneFile, Surface, Translucent};
 use marmor::words::{albedo, counted, digits, percent, short};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -209,8 +209,7 @@ fn write_mended(prepared: &super::setup::Prepared, folder: &Path) -> Result<()> 
     files.reads_scene(&prepared.file);
     let mut all = Vec::new();
     for entry in &prepared.file.objects {
-        let Geometry::Mesh(path) = &entry.geometry else { continue };
-        let mesh = load_obj_with_uv(&scene_folder.join(path))?;
+        let Some(mesh) = entry.read_mesh(scene_folder)? else { continue };
         let (mesh, done) = mended(if entry.flip { mesh.flipped() } else { mesh });
         if done == Mended::default() {
             continue;

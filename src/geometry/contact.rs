@@ -315,24 +315,24 @@ fn overlap(one: &Face, two: &Face, n: DVec3, gap: f64) -> Option<(Kind, DVec3)> 
 mod tests {
     use super::*;
     use crate::geometry::test_shapes::{self, joined};
-    use crate::geometry::{Mesh, ObjMesh, Seams, sphere};
+    use crate::geometry::{Mesh, RawMesh, Seams, sphere};
 
     const GAP: f64 = 1e-6;
 
-    fn cuboid(centre: DVec3, half: DVec3, n: u32) -> ObjMesh {
+    fn cuboid(centre: DVec3, half: DVec3, n: u32) -> RawMesh {
         test_shapes::cuboid(centre, half, n, false)
     }
 
-    fn cube(x: f64, y: f64, z: f64, n: u32) -> ObjMesh {
+    fn cube(x: f64, y: f64, z: f64, n: u32) -> RawMesh {
         cuboid(DVec3::new(x, y, z), DVec3::splat(1.0), n)
     }
 
-    fn solid(mesh: &ObjMesh) -> Solid {
+    fn solid(mesh: &RawMesh) -> Solid {
         let mesh: Mesh = mesh.recentred(DVec3::ZERO);
         Solid::new(&mesh)
     }
 
-    fn kind(a: &ObjMesh, b: &ObjMesh) -> &'static str {
+    fn kind(a: &RawMesh, b: &RawMesh) -> &'static str {
         let (one, two) = (solid(a), solid(b));
         let found = meeting(&one, &two, GAP, Seek::Crossing, |_| true);
         let reversed = meeting(&two, &one, GAP, Seek::Crossing, |_| true);
@@ -420,7 +420,7 @@ mod tests {
             (cube(0.0, 0.0, 0.0, 2), "crossing"),
             (cube(1.99, 0.0, 0.0, 2), "crossing"),
         ] {
-            let placed = |mesh: &ObjMesh| mesh.clone().placed(turn);
+            let placed = |mesh: &RawMesh| mesh.clone().placed(turn);
             assert_eq!(kind(&placed(&cube(0.0, 0.0, 0.0, 1)), &placed(&other)), expected);
         }
     }

@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::geometry::{rectangle, sphere};
 
-    fn mesh(made: &crate::geometry::ObjMesh) -> Mesh {
+    fn mesh(made: &crate::geometry::RawMesh) -> Mesh {
         Mesh { positions: made.positions.clone(), triangles: made.triangles.clone(), ..Mesh::default() }
     }
 

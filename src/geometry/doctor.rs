@@ -2,7 +2,7 @@
 //! that look the wrong way. Read first: [`examine`]; docs/robustness.md says what marmor does about each finding.
 
 use super::weld::{Seam, moved_to, seam};
-use super::{Mesh, ObjMesh};
+use super::{Mesh, RawMesh};
 use crate::math::{Aabb, DVec3};
 use crate::words::counted;
 use rayon::slice::ParallelSliceMut as _;
@@ -123,7 +123,7 @@ impl std::fmt::Display for Mended {
 /// The mesh with rims that lie along each other welded (see [`Seam`]), without faces that have no area or repeat an earlier one, and with faces turned so that neighbours agree and
 /// closed parts look outwards. Parts are joined at edges of two faces. A closed part inside the box of another one is a
 /// cavity and keeps the direction that most of its faces have, as do parts with a rim. Holes stay open.
-pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
+pub fn mended(mesh: RawMesh) -> (RawMesh, Mended) {
     let point = |i: u32| mesh.positions[i as usize];
     let mut first_at = welded(mesh.positions.len(), point, |_| 0);
     let mut faces = Faces::new(&mesh.triangles, &first_at, &point);
@@ -165,7 +165,9 @@ pub fn mended(mesh: ObjMesh) -> (ObjMesh, Mended) {
         let of = |&t: &u32| uv[t as usize].map(|[a, b, c]| if turn[t as usize] { [a, c, b] } else { [a, b, c] });
         faces.kept.iter().map(of).collect()
     });
-    (ObjMesh { triangles, normals, uv, ..mesh }, done)
+    // Triangles have other numbers now.
+    let parts = super::Parts::default();
+    (RawMesh { triangles, normals, uv, parts, ..mesh }, done)
 }
 
 /// For each vertex the first one of its group at the same place.
@@ -342,15 +344,15 @@ mod tests {
     use super::super::sphere;
     use super::*;
 
-    fn ball(radius: f64) -> ObjMesh {
+    fn ball(radius: f64) -> RawMesh {
         sphere(DVec3::new(1.0, 2.0, 3.0), radius, 8, 12)
     }
 
-    fn seen(mesh: &ObjMesh) -> Findings {
+    fn seen(mesh: &RawMesh) -> Findings {
         examine(&mesh.recentred(DVec3::ZERO))
     }
 
-    fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
+    fn joined(mut a: RawMesh, b: &RawMesh) -> RawMesh {
         let base = a.positions.len() as u32;
         a.positions.extend(&b.positions);
         a.triangles.extend(b.triangles.iter().map(|t| t.map(|i| base + i)));
@@ -389,10 +391,10 @@ mod tests {
     #[test]
     fn vertices_at_one_place_are_one_however_they_are_shared() {
         let mesh = ball(1.0);
-        let soup = ObjMesh {
+        let soup = RawMesh {
             positions: mesh.triangles.iter().flatten().map(|&i| mesh.positions[i as usize]).collect(),
             triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-            ..ObjMesh::default()
+            ..RawMesh::default()
         };
         let (soup, mesh) = (seen(&soup), seen(&mesh));
         // Edges are added up in another order.
@@ -436,10 +438,10 @@ mod tests {
                 let turn = (k % 7) as f64 - 3.0;
                 mesh.positions[i as usize] + DVec3::new(turn, -turn, 0.5 * turn) * (0.2 * apart)
             };
-            let mut soup = ObjMesh {
+            let mut soup = RawMesh {
                 positions: mesh.triangles.iter().flatten().enumerate().map(corner).collect(),
                 triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
-                ..ObjMesh::default()
+                ..RawMesh::default()
             };
             let found = seen(&soup);
             let seam = found.seam.unwrap_or_else(|| panic!("{apart}: {found:?}"));
@@ -469,7 +471,7 @@ mod tests {
         assert_eq!(seen(&joined(sheet(0.0), &sheet(0.02))).seam, None);
         // A rim of edges shorter than the distances tried.
         let n = 1000_u32;
-        let mut fan = ObjMesh { positions: vec![DVec3::ZERO], ..ObjMesh::default() };
+        let mut fan = RawMesh { positions: vec![DVec3::ZERO], ..RawMesh::default() };
         let at = |i: u32| (f64::from(i) * 1e-5).sin_cos();
         fan.positions.extend((0..=n).map(|i| DVec3::new(at(i).1, at(i).0, 0.0)));
         fan.triangles = (1..=n).map(|i| [0, i, i + 1]).collect();
@@ -478,7 +480,7 @@ mod tests {
 
     #[test]
     fn nothing_at_all_is_no_fault() {
-        assert_eq!(seen(&ObjMesh::default()), Findings::default());
-        assert_eq!(mended(ObjMesh::default()).1, Mended::default());
+        assert_eq!(seen(&RawMesh::default()), Findings::default());
+        assert_eq!(mended(RawMesh::default()).1, Mended::default());
     }
 }

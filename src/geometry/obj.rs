@@ -1,54 +1,26 @@
 //! OBJ files through `tobj`: positions in f64, polygons cut into triangles, groups joined.
 
-use std::fs::File;
-use std::io::{BufReader, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
 
 use super::obj_lines::ObjLines;
-use super::obj_remarks::OddPolygons;
+use super::odd_polygons::OddPolygons;
 use super::polygon::triangulate;
-use super::{ObjMesh, ObjNormals};
+use super::{Parts, RawMesh, RawNormals};
 use crate::error::{Error, Result};
 use crate::math::DVec3;
 use crate::words::counted;
 
-/// Reads the triangles of an OBJ file: all groups and objects joined, vertices shared between them, unused vertices
-/// left out. Polygons are cut into triangles, concave ones and those with a hole too. Texture coordinates (but see
-/// [`load_obj_with_uv`]), vertex colours, weights, materials, smoothing groups and curves are not read; a missing MTL file is no error. What a user should hear of
-/// is in [`ObjMesh::remarks`]. A face has the file's normals only where all its corners have one.
-///
-/// # Errors
-/// A file error if `path` cannot be read. A scene error that names path and line if a vertex is not finite or not a
-/// number, an index is 0 or of a vertex that does not exist, or a line is longer than 16 MiB; one that names the path
-/// if there are no faces. A Memory error, found while reading, if the mesh is more than what is available.
-pub fn load_obj(path: &Path) -> Result<ObjMesh> {
-    load(path, false)
-}
-
-/// As [`load_obj`], with texture coordinates of the faces that have some at all their corners. Such that are not there or no
-/// finite numbers count as missing.
-///
-/// # Errors
-/// As [`load_obj`].
-pub fn load_obj_with_uv(path: &Path) -> Result<ObjMesh> {
-    load(path, true)
-}
-
-fn load(path: &Path, uv: bool) -> Result<ObjMesh> {
-    let metadata = std::fs::metadata(path).map_err(|e| Error::file(path, "read", e))?;
-    if !metadata.is_file() {
-        let what = if metadata.is_dir() { "it is a folder" } else { "it is not a regular file" };
-        return Err(Error::file(path, "read", format!("{what}; name an OBJ file")));
-    }
-    let file = File::open(path).map_err(|e| Error::file(path, "read", e))?;
-    parse(&mut ObjLines::new(BufReader::with_capacity(1 << 16, file), uv), path)
+/// Reads an OBJ file, with texture coordinates if `uv`; a missing MTL file is no error. See [`super::load_mesh`].
+pub(super) fn read(source: impl BufRead, path: &Path, uv: bool) -> Result<RawMesh> {
+    parse(&mut ObjLines::new(source, uv), path)
 }
 
 /// Writes a mesh as OBJ, every digit of it.
 ///
 /// # Errors
 /// What the system says.
-pub fn write_obj(mesh: &ObjMesh, out: &mut dyn Write) -> std::io::Result<()> {
+pub fn write_obj(mesh: &RawMesh, out: &mut dyn Write) -> std::io::Result<()> {
     for p in &mesh.positions {
         writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
     }
@@ -78,7 +50,7 @@ pub fn write_obj(mesh: &ObjMesh, out: &mut dyn Write) -> std::io::Result<()> {
     Ok(())
 }
 
-fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<ObjMesh> {
+fn parse<R: BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<RawMesh> {
     let options = tobj::LoadOptions { triangulate: false, ..tobj::LoadOptions::default() };
     let loaded = tobj::load_obj_buf(lines, &options, |_| Err(tobj::LoadError::OpenFileFailed));
     // What the reader of lines found first; tobj's own complaints carry no line.
@@ -99,7 +71,7 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
         return Err(at(line, &what));
     }
     let (models, _) = loaded.map_err(|e| at(lines.line(), &explain(e, lines.current())))?;
-    let mut out = ObjMesh::default();
+    let mut out = RawMesh::default();
     // The reader of lines drops `o`, `g` and `usemtl`, so there is at most one model.
     if let Some(model) = models.into_iter().next() {
         out = cut(&model.mesh, lines);
@@ -126,20 +98,26 @@ fn parse<R: std::io::BufRead>(lines: &mut ObjLines<R>, path: &Path) -> Result<Ob
 }
 
 /// The triangles of the faces, with the normals and texture coordinates of those that have them.
-fn cut<R: std::io::BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> ObjMesh {
-    let mut out = ObjMesh {
+fn cut<R: BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> RawMesh {
+    let mut out = RawMesh {
         positions: mesh.positions.chunks_exact(3).map(|p| DVec3::new(p[0], p[1], p[2])).collect(),
-        normals: vectors(mesh, lines.has_normals()).map(|vectors| ObjNormals { vectors, triangles: Vec::new() }),
+        normals: vectors(mesh, lines.has_normals()).map(|vectors| RawNormals { vectors, triangles: Vec::new() }),
         uv: lines.uv().filter(|uv| uv.is_used()).map(|_| Vec::new()),
-        ..ObjMesh::default()
+        ..RawMesh::default()
     };
     let mut polygon_lines = lines.polygon_lines().iter();
-    let (mut corners, mut triangles, mut odd) = (Vec::new(), Vec::new(), OddPolygons::default());
+    let (mut corners, mut triangles, mut odd) = (Vec::new(), Vec::new(), OddPolygons::new("in line"));
+    let labelled = lines.labelled();
+    let mut runs = labelled.runs().iter().peekable();
+    let mut runs_out = Vec::with_capacity(labelled.runs().len());
     let mut start = 0;
     for (face, &has_normals) in lines.has_normals().iter().enumerate() {
         // Without arities all faces are triangles.
         let arity = mesh.face_arities.get(face).map_or(3, |&n| n as usize);
         let of = |indices: &[u32], t: [u32; 3]| t.map(|i| indices[start + i as usize]);
+        if let Some((_, label)) = runs.next_if(|(first, _)| *first as usize == face) {
+            runs_out.push((out.triangles.len() as u32, *label));
+        }
         triangles.clear();
         if arity == 3 {
             triangles.push([0, 1, 2]);
@@ -160,17 +138,14 @@ fn cut<R: std::io::BufRead>(mesh: &tobj::Mesh, lines: &ObjLines<R>) -> ObjMesh {
         }
         start += arity;
     }
+    out.parts = Parts::new(labelled.labels().to_vec(), runs_out);
     out.remarks = odd.remarks().collect();
     out
 }
 
 /// The file's normals, if any face has them; 0 stands for one without a direction.
 fn vectors(mesh: &tobj::Mesh, has: &[bool]) -> Option<Vec<DVec3>> {
-    let unit = |n: &[f64]| {
-        let n = DVec3::new(n[0], n[1], n[2]);
-        // Divided by its largest component first, so that no length overflows or vanishes.
-        (n / n.abs().max_element()).normalize_or_zero()
-    };
+    let unit = |n: &[f64]| super::unit_or_zero(DVec3::new(n[0], n[1], n[2]));
     has.contains(&true).then(|| mesh.normals.chunks_exact(3).map(unit).collect())
 }
 
@@ -184,5 +159,5 @@ fn explain(error: tobj::LoadError, line: &str) -> String {
         E::FaceVertexOutOfBounds | E::FaceNormalOutOfBounds => ("a face of vertices that do not exist", "export again"),
         other => return format!("not readable as OBJ: {other}"),
     };
-    format!("{what} in `{}`; {remedy}", super::obj_lines::shown(line))
+    format!("{what} in `{}`; {remedy}", super::shown(line))
 }

@@ -1,24 +1,13 @@
 //! The lines of an OBJ file on their way to `tobj`: counted, so that a complaint can name one, and reduced to what we
 //! use, so that neither a bad texture index, a Latin-1 comment nor a missing MTL file stops a mesh.
 
-use super::CornerUv;
+use super::loading::{Budget, MAX_COUNT, MAX_LINE};
 use super::obj_remarks::{CALLS, CURVED, KNOWN, OddLines};
+use super::parts::{Label, Labelled};
+use super::{CornerUv, shown};
+use crate::Error;
 use crate::words::either;
-use crate::{Error, memory};
 use std::io::{self, BufRead, Read};
-
-/// Memory while a mesh is read, looked at and put into a tree [bytes/triangle], at its most; measured with a million that have
-/// normals. `cli/need.rs` tells it apart by what takes it.
-pub const LOADING_BYTES: usize = 265;
-
-/// The same of texture coordinates, where they are asked for: as typed, and of each corner.
-const UV_BYTES: usize = 72;
-
-/// Longer than any real line, polygons of a million corners included; keeps a binary file from being read as one.
-const MAX_LINE: usize = 1 << 24;
-
-/// This many vertices, normals or triangles are refused, so that indices stay below 2^32.
-const MAX_COUNT: usize = 1 << 31;
 
 /// Texture coordinates as they are typed. tobj, which refuses a file for one bad number, does not see them.
 #[derive(Default)]
@@ -79,23 +68,14 @@ pub(super) struct ObjLines<R> {
     polygon_lines: Vec<usize>,
     /// Where they are asked for.
     uv: Option<TypedUv>,
+    /// Which object, group and material faces are of.
+    labelled: Labelled,
     ignored: usize,
     odd: OddLines,
     complaint: Option<(usize, String)>,
     failed: Option<io::Error>,
-    /// Entries at which memory is looked at next.
-    look_at: usize,
+    budget: Budget,
     out_of_memory: Option<Error>,
-}
-
-/// At most 40 characters of a line, for messages.
-pub(super) fn shown(line: &str) -> String {
-    let line = line.trim();
-    let mut text: String = line.chars().take(40).flat_map(char::escape_debug).collect();
-    if line.chars().nth(40).is_some() {
-        text.push_str("...");
-    }
-    text
 }
 
 impl<R: BufRead> ObjLines<R> {
@@ -114,11 +94,12 @@ impl<R: BufRead> ObjLines<R> {
             has_normals: Vec::new(),
             polygon_lines: Vec::new(),
             uv: uv.then(TypedUv::default),
+            labelled: Labelled::default(),
             ignored: 0,
             odd: OddLines::default(),
             complaint: None,
             failed: None,
-            look_at: 1 << 20,
+            budget: Budget::new(uv),
             out_of_memory: None,
         }
     }
@@ -152,6 +133,11 @@ impl<R: BufRead> ObjLines<R> {
         &self.polygon_lines
     }
 
+    /// Which object, group and material faces are of.
+    pub(super) fn labelled(&self) -> &Labelled {
+        &self.labelled
+    }
+
     /// Texture coordinates, where they are asked for.
     pub(super) fn uv(&self) -> Option<&TypedUv> {
         self.uv.as_ref()
@@ -170,15 +156,7 @@ impl<R: BufRead> ObjLines<R> {
 
     /// Whether there is memory to read on: as much again as what has been read needs.
     fn fits(&mut self, count: usize) -> bool {
-        if count < self.look_at {
-            return true;
-        }
-        self.look_at = 2 * count;
-        let bytes = LOADING_BYTES + if self.uv.is_some() { UV_BYTES } else { 0 };
-        let needed = count as u128 * bytes as u128;
-        let what = format!("a mesh of {count} or more vertices or triangles");
-        let checked = memory::require(needed, memory::available(), &what, "use a coarser mesh");
-        self.out_of_memory = checked.err();
+        self.out_of_memory = self.budget.check(count).err();
         self.out_of_memory.is_none()
     }
 
@@ -273,6 +251,7 @@ impl<R: BufRead> ObjLines<R> {
             let keyword = words.split(u8::is_ascii_whitespace).next().unwrap_or_default();
             match keyword {
                 b"l" | b"p" => self.ignored += 1,
+                b"o" | b"g" | b"usemtl" => self.label(&String::from_utf8_lossy(words)),
                 b"vt" if self.uv.is_some() => {
                     if let Some(uv) = &mut self.uv {
                         uv.add(&String::from_utf8_lossy(words));
@@ -288,7 +267,7 @@ impl<R: BufRead> ObjLines<R> {
                     let text = String::from_utf8_lossy(words);
                     let checked =
                         if keyword[0] == b'f' { self.face(&text) } else { self.vector(&text, keyword == b"v") };
-                    let count = self.vertices.max(self.normals).max(self.triangles);
+                    let count = self.vertices.max(self.normals).max(self.triangles).max(self.labelled.weight());
                     let fits =
                         || if count < MAX_COUNT { Ok(()) } else { Err("2^31 entries; split the mesh".to_string()) };
                     if let Err(what) = checked.and_then(|()| fits()) {
@@ -317,6 +296,17 @@ impl<R: BufRead> ObjLines<R> {
             }
         }
         Ok(())
+    }
+
+    /// What faces are called from here on. A line without a name ends the last one's.
+    fn label(&mut self, text: &str) {
+        let (keyword, rest) = text.split_at(text.find(|c: char| c.is_ascii_whitespace()).unwrap_or(text.len()));
+        let name = Some(rest.trim()).filter(|name| !name.is_empty()).map(String::from);
+        self.labelled.change(|label: &mut Label| match keyword {
+            "o" => label.object = name,
+            "usemtl" => label.material = name,
+            _ => label.groups = rest.split_whitespace().map(String::from).collect(),
+        });
     }
 
     /// A vertex or normal: finite, its three numbers alone.
@@ -395,6 +385,7 @@ impl<R: BufRead> ObjLines<R> {
         out.push('\n');
         self.out = out;
         self.triangles += corners.len() - 2;
+        self.labelled.face(self.has_normals.len());
         self.has_normals.push(with_normals);
         if !with_normals && corners.iter().any(|(_, _, vn)| vn.is_some()) {
             self.odd.half_shaded.count(|| (), self.line);

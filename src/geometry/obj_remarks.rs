@@ -1,6 +1,5 @@
-//! What is odd about the lines and the polygons of an OBJ file, in one sentence for each kind.
+//! What is odd about the lines of an OBJ file, in one sentence for each kind.
 
-use super::polygon::Shape;
 use crate::words::{counted, either};
 
 /// Lines that are read in part or not at all: how many, and the first.
@@ -48,11 +47,8 @@ impl<T> Seen<T> {
 pub(super) const KNOWN: &[&str] = &[
     "vt",
     "vp",
-    "o",
-    "g",
     "s",
     "mg",
-    "usemtl",
     "usemap",
     "mtllib",
     "maplib",
@@ -135,62 +131,5 @@ impl OddLines {
         ]
         .into_iter()
         .flatten()
-    }
-}
-
-/// A polygon with corners farther off its plane than this share of its size, the root of its area, is said to be not
-/// plane: what lies between the corners is then a guess. A square folded along its diagonal by 30 degrees has 0.093, the
-/// quads of a modelled head 0.02 in the median.
-const BENT: f64 = 0.1;
-
-/// Polygons of a file that are odd, to be said in one sentence each.
-#[derive(Default)]
-pub(super) struct OddPolygons {
-    polygons: usize,
-    crossing: usize,
-    first_crossing: usize,
-    bent: usize,
-    most_bent: (f64, usize),
-}
-
-impl OddPolygons {
-    /// Counts a polygon that stands in `line`.
-    pub(super) fn count(&mut self, shape: Shape, line: usize) {
-        self.polygons += 1;
-        if shape.crosses {
-            self.crossing += 1;
-            if self.crossing == 1 {
-                self.first_crossing = line;
-            }
-        }
-        if shape.off_plane > BENT {
-            self.bent += 1;
-            if shape.off_plane > self.most_bent.0 {
-                self.most_bent = (shape.off_plane, line);
-            }
-        }
-    }
-
-    /// What there is to say.
-    pub(super) fn remarks(&self) -> impl Iterator<Item = String> {
-        let (all, remedy) =
-            (counted(self.polygons, "polygon", "polygons"), "cut them into triangles in the modelling program");
-        let crossing = (self.crossing > 0).then(|| {
-            let (n, line) = (self.crossing, self.first_crossing);
-            let (cross, are) = (either(n, "crosses or covers itself", "cross or cover themselves"), either(n, "is", "are"));
-            let they_wind = either(n, "it winds", "they wind");
-            format!(
-                "{n} of {all} {cross} (the first in line {line}) and {are} filled wherever {they_wind} round a point; {remedy}"
-            )
-        });
-        let bent = (self.bent > 0).then(|| {
-            let (n, (off, line)) = (self.bent, self.most_bent);
-            format!(
-                "{n} of {all} {} not plane (corners up to {off:.2} of the polygon's size off its plane, in line {line}): \
-                 the surface between their corners is a guess; {remedy}",
-                either(n, "is", "are")
-            )
-        });
-        crossing.into_iter().chain(bent)
     }
 }

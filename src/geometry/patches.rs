@@ -244,9 +244,9 @@ fn partition(own: &mut [u32], below: impl Fn(u32) -> bool) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{ObjMesh, rectangle, sphere};
+    use crate::geometry::{RawMesh, rectangle, sphere};
 
-    fn mesh(mesh: &ObjMesh) -> Mesh {
+    fn mesh(mesh: &RawMesh) -> Mesh {
         mesh.recentred(DVec3::ZERO)
     }
 

@@ -1,12 +1,12 @@
 //! Simple shapes as triangles, for lights, floors and furnaces.
 
-use super::{CornerUv, ObjMesh, ObjNormals};
+use super::{CornerUv, RawMesh, RawNormals};
 use crate::math::DVec3;
 
 /// A parallelogram with corners `centre` ± `edge_u` ± `edge_v`, both half edges; its outside is the side that
 /// `edge_u` x `edge_v` points to.
-pub fn rectangle(centre: DVec3, edge_u: DVec3, edge_v: DVec3) -> ObjMesh {
-    ObjMesh {
+pub fn rectangle(centre: DVec3, edge_u: DVec3, edge_v: DVec3) -> RawMesh {
+    RawMesh {
         positions: vec![
             centre - edge_u - edge_v,
             centre + edge_u - edge_v,
@@ -14,7 +14,7 @@ pub fn rectangle(centre: DVec3, edge_u: DVec3, edge_v: DVec3) -> ObjMesh {
             centre - edge_u + edge_v,
         ],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
-        ..ObjMesh::default()
+        ..RawMesh::default()
     }
 }
 
@@ -25,7 +25,7 @@ pub fn rectangle_uv() -> Vec<Option<CornerUv>> {
 
 /// A sphere of `rings` bands from pole to pole (along y) and `segments` around, rings >= 2, segments >= 3, with the
 /// sphere's own normals. The vertices lie on the sphere, the triangles a little inside.
-pub fn sphere(centre: DVec3, radius: f64, rings: u32, segments: u32) -> ObjMesh {
+pub fn sphere(centre: DVec3, radius: f64, rings: u32, segments: u32) -> RawMesh {
     debug_assert!(rings >= 2 && segments >= 3);
     let mut vectors = vec![DVec3::Y];
     for i in 1..rings {
@@ -46,11 +46,11 @@ pub fn sphere(centre: DVec3, radius: f64, rings: u32, segments: u32) -> ObjMesh 
         }
         triangles.push([last, at(rings - 1, j), at(rings - 1, j + 1)]);
     }
-    ObjMesh {
+    RawMesh {
         positions: vectors.iter().map(|n| centre + *n * radius).collect(),
-        normals: Some(ObjNormals { triangles: triangles.iter().copied().map(Some).collect(), vectors }),
+        normals: Some(RawNormals { triangles: triangles.iter().copied().map(Some).collect(), vectors }),
         triangles,
-        ..ObjMesh::default()
+        ..RawMesh::default()
     }
 }
 
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     /// Enclosed volume by the divergence theorem: positive if the winding is outward.
-    fn volume(mesh: &ObjMesh) -> f64 {
+    fn volume(mesh: &RawMesh) -> f64 {
         let corner = |i: u32| mesh.positions[i as usize];
         mesh.triangles.iter().map(|&[a, b, c]| corner(a).dot(corner(b).cross(corner(c))) / 6.0).sum()
     }

@@ -1,14 +1,14 @@
 //! The closed body of an open surface: a sheet of some thickness, of which the surface is the middle.
 
 use super::doctor::welded;
-use super::{ObjMesh, ObjNormals};
+use super::{RawMesh, RawNormals};
 use crate::math::{DMat3, DVec3};
 
 /// A sheet with both faces and the rim between them.
 #[derive(Clone, Debug)]
 pub struct Thick {
     /// Front, back and rim, closed.
-    pub mesh: ObjMesh,
+    pub mesh: RawMesh,
     /// Where the thickness could not be kept; `None` where it was.
     pub blunted: Option<Blunted>,
 }
@@ -56,7 +56,7 @@ struct Surface {
 type Edge = (u32, u32, bool, usize);
 
 impl Surface {
-    fn new(mesh: &ObjMesh) -> Result<(Self, Vec<Edge>), NoSheet> {
+    fn new(mesh: &RawMesh) -> Result<(Self, Vec<Edge>), NoSheet> {
         let place = welded(mesh.positions.len(), |i| mesh.positions[i as usize], |_| 0);
         let corners = |t: usize| mesh.triangles[t].map(|i| place[i as usize]);
         let whole = |t: &usize| {
@@ -90,17 +90,17 @@ fn uses(edges: &[Edge]) -> impl Iterator<Item = &[Edge]> {
     edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1))
 }
 
-fn middle(mesh: &ObjMesh, edge: &Edge) -> DVec3 {
+fn middle(mesh: &RawMesh, edge: &Edge) -> DVec3 {
     0.5 * (mesh.positions[edge.0 as usize] + mesh.positions[edge.1 as usize])
 }
 
-fn scaled_normal(mesh: &ObjMesh, triangle: [u32; 3]) -> DVec3 {
+fn scaled_normal(mesh: &RawMesh, triangle: [u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|i| mesh.positions[i as usize]);
     (b - a).cross(c - a)
 }
 
 /// Which triangles to turn for neighbours to run along their edge in opposite directions; the first of each part stays.
-fn turned(mesh: &ObjMesh, count: usize, edges: &[Edge]) -> Result<Vec<bool>, NoSheet> {
+fn turned(mesh: &RawMesh, count: usize, edges: &[Edge]) -> Result<Vec<bool>, NoSheet> {
     let mut beside: Vec<Vec<(usize, bool, usize)>> = vec![Vec::new(); count];
     let mut open = vec![false; count];
     for (number, uses) in uses(edges).enumerate() {
@@ -186,7 +186,7 @@ impl Around {
 ///
 /// # Errors
 /// A surface that is closed, has no area, hangs together at edges of three faces, has one side only, or bends too sharply.
-pub fn thickened(mesh: &ObjMesh, thickness: f64) -> Result<Thick, NoSheet> {
+pub fn thickened(mesh: &RawMesh, thickness: f64) -> Result<Thick, NoSheet> {
     let (surface, edges) = Surface::new(mesh)?;
     let pick = |turn: bool, [a, b, c]: [u32; 3]| if turn { [a, c, b] } else { [a, b, c] };
     let front: Vec<[u32; 3]> = surface.triangles.iter().map(|&(t, turn)| pick(turn, mesh.triangles[t])).collect();
@@ -221,7 +221,7 @@ pub fn thickened(mesh: &ObjMesh, thickness: f64) -> Result<Thick, NoSheet> {
         sides.into_iter().flatten().map(|(i, side)| mesh.positions[i] + half(i) * side).collect();
     let count = mesh.positions.len() as u32;
     let back = |i: u32| count + i;
-    let body = ObjMesh { positions, ..ObjMesh::default() };
+    let body = RawMesh { positions, ..RawMesh::default() };
     for &triangle in &front {
         let n = scaled_normal(mesh, triangle);
         let kept = |moved: [u32; 3]| n == DVec3::ZERO || scaled_normal(&body, moved).dot(n) > 0.0;
@@ -257,9 +257,9 @@ pub fn thickened(mesh: &ObjMesh, thickness: f64) -> Result<Thick, NoSheet> {
         let mut all: Vec<Option<[u32; 3]>> = own.iter().copied().chain(behind).collect();
         all.resize(triangles.len(), None);
         let vectors = normals.vectors.iter().copied().chain(normals.vectors.iter().map(|n| -*n)).collect();
-        ObjNormals { vectors, triangles: all }
+        RawNormals { vectors, triangles: all }
     });
-    Ok(Thick { mesh: ObjMesh { triangles, normals, uv, remarks: mesh.remarks.clone(), ..body }, blunted })
+    Ok(Thick { mesh: RawMesh { triangles, normals, uv, remarks: mesh.remarks.clone(), ..body }, blunted })
 }
 
 /// The edge of a triangle whose corners are at two places, in its own direction.

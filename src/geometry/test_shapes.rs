@@ -1,10 +1,10 @@
-//! Meshes of tests, those in `tests/` too, which include this file with their own `DVec3` and `ObjMesh`.
+//! Meshes of tests, those in `tests/` too, which include this file with their own `DVec3` and `RawMesh`.
 
-use super::{DVec3, ObjMesh};
+use super::{DVec3, RawMesh};
 
 /// A box, each face cut into `n` by `n` squares, the diagonals one way or the other.
-pub fn cuboid(centre: DVec3, half: DVec3, n: u32, other: bool) -> ObjMesh {
-    let mut mesh = ObjMesh::default();
+pub fn cuboid(centre: DVec3, half: DVec3, n: u32, other: bool) -> RawMesh {
+    let mut mesh = RawMesh::default();
     for axis in 0..3 {
         let (u, v) = (DVec3::AXES[(axis + 1) % 3], DVec3::AXES[(axis + 2) % 3]);
         for (w, u) in [(DVec3::AXES[axis], u), (-DVec3::AXES[axis], -u)] {
@@ -23,7 +23,7 @@ pub fn cuboid(centre: DVec3, half: DVec3, n: u32, other: bool) -> ObjMesh {
 }
 
 /// Both in one mesh, without normals.
-pub fn joined(mut a: ObjMesh, b: &ObjMesh) -> ObjMesh {
+pub fn joined(mut a: RawMesh, b: &RawMesh) -> RawMesh {
     let base = a.positions.len() as u32;
     a.positions.extend(&b.positions);
     a.triangles.extend(b.triangles.iter().map(|t| t.map(|i| base + i)));

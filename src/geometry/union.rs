@@ -112,13 +112,13 @@ fn is_inside(solid: &Solid, face: &Face, x: DVec3, gap: f64) -> bool {
 mod tests {
     use super::*;
     use crate::geometry::test_shapes::{cuboid, joined};
-    use crate::geometry::{AreaTable, Mesh, ObjMesh, sphere};
+    use crate::geometry::{AreaTable, Mesh, RawMesh, sphere};
     use crate::math::{hash, unit_f32, unit_f64};
 
     const GAP: f64 = 1e-6;
 
     /// Area that bears light, and area that is hidden, by `n` points, with the area of all.
-    fn areas(mesh: &ObjMesh, n: u64) -> [f64; 3] {
+    fn areas(mesh: &RawMesh, n: u64) -> [f64; 3] {
         let mesh: Mesh = mesh.recentred(DVec3::ZERO);
         let (union, table) = (Union::new(Solid::new(&mesh), mesh.triangles.len(), GAP), AreaTable::new(&mesh).unwrap());
         let (mut bears, mut hides) = (0, 0);
@@ -139,7 +139,7 @@ mod tests {
             .unwrap()
     }
 
-    fn cube(x: f64, half: f64, n: u32) -> ObjMesh {
+    fn cube(x: f64, half: f64, n: u32) -> RawMesh {
         cuboid(DVec3::new(x, 0.0, 0.0), DVec3::splat(half), n, n.is_multiple_of(2))
     }
 
@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn the_area_of_a_union_is_that_of_its_shape() {
         let n = 40_000;
-        let flipped = |mesh: ObjMesh| mesh.flipped();
+        let flipped = |mesh: RawMesh| mesh.flipped();
         let cases = [
             ("flush, overlapping by half", joined(cube(0.0, 1.0, 1), &cube(1.0, 1.0, 2)), 8.0 + 4.0 * 6.0, 8.0),
             ("touching", joined(cube(0.0, 1.0, 1), &cube(2.0, 1.0, 2)), 8.0 + 4.0 * 8.0, 8.0),

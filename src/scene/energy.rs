@@ -175,7 +175,7 @@ mod tests {
     use crate::scene::Object;
     use std::f64::consts::PI;
 
-    fn object(mesh: &crate::geometry::ObjMesh) -> Object {
+    fn object(mesh: &crate::geometry::RawMesh) -> Object {
         let mesh = mesh.recentred(DVec3::ZERO);
         let findings = examine(&mesh);
         Object {
@@ -197,7 +197,7 @@ mod tests {
 
     /// Six rectangles, their corners at the same places.
     fn cuboid(half: [f64; 3]) -> Object {
-        let mut all = crate::geometry::ObjMesh::default();
+        let mut all = crate::geometry::RawMesh::default();
         for axis in 0..3 {
             for side in [-1.0, 1.0] {
                 let along = |i: usize| DVec3::from_array(std::array::from_fn(|k| if k == i { half[k] } else { 0.0 }));

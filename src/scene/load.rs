@@ -1,9 +1,9 @@
 //! The way from the file as typed to the checked world: meshes read, placed and recentred in f64, then rounded.
 
-use std::collections::{HashMap, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::file::SceneFile;
+use super::mesh_files::MeshFiles;
 use super::objects::{Geometry, NormalsChoice, ObjectEntry, grouped};
 use super::options::MethodName;
 use super::textures::Loader;
@@ -12,15 +12,15 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::geometry::{
-    Findings, LOADING_BYTES, Mended, Mesh, ObjMesh, Precision, Solid, examine, load_obj, load_obj_with_uv, mended,
-    rectangle, rectangle_uv, sphere, sphere_uv,
+    Findings, LOADING_BYTES, Mended, Mesh, Precision, RawMesh, Solid, examine, mended, rectangle, rectangle_uv, sphere,
+    sphere_uv,
 };
 use crate::math::{Aabb, DVec3};
 use crate::memory;
 use crate::words::{counted, either};
 
 impl Scene {
-    /// Reads the meshes of a scene file (each OBJ once) and makes the world from them. What is odd but can be
+    /// Reads the meshes of a scene file (each file once) and makes the world from them. What is odd but can be
     /// rendered is in [`Scene::warnings`].
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Scene {
         let body = |entry: &ObjectEntry| file.materials[entry.material].surface.is_body();
         let bodies = file.objects.iter().zip(&placed).filter(|(entry, _)| body(entry)).map(|(_, mesh)| mesh);
         let centre = centre(bodies).or_else(|| self::centre(&placed)).unwrap_or(DVec3::ZERO);
-        let mut placed: Vec<Option<ObjMesh>> = placed.into_iter().map(Some).collect();
+        let mut placed: Vec<Option<RawMesh>> = placed.into_iter().map(Some).collect();
         let mut objects = Vec::with_capacity(placed.len());
         for group in grouped(&file.objects) {
             let entry = &file.objects[group[0]];
@@ -55,7 +55,7 @@ impl Scene {
                 _ => 0,
             };
             let alone = group.iter().map(|&i| alone(i)).sum();
-            let meshes: Vec<ObjMesh> = group.iter().filter_map(|&i| placed[i].take()).collect();
+            let meshes: Vec<RawMesh> = group.iter().filter_map(|&i| placed[i].take()).collect();
             let as_placed = one_mesh(meshes, centre);
             let mesh = as_placed.recentred(centre);
             drop(as_placed);
@@ -165,29 +165,21 @@ fn lights_outside(scene: &Scene) -> Result<()> {
 }
 
 /// The mesh of a body of several objects, or of one.
-fn one_mesh(mut meshes: Vec<ObjMesh>, centre: DVec3) -> ObjMesh {
+fn one_mesh(mut meshes: Vec<RawMesh>, centre: DVec3) -> RawMesh {
     if meshes.len() == 1 {
         return meshes.pop().unwrap_or_default();
     }
-    let closed = |mesh: &ObjMesh| {
+    let closed = |mesh: &RawMesh| {
         let found = examine(&mesh.recentred(centre));
         found.open_edges == 0 && found.mixed_edges == 0
     };
-    ObjMesh::joined(meshes.into_iter().map(|mesh| (closed(&mesh), mesh)).map(|(closed, mesh)| (mesh, closed)).collect())
+    RawMesh::joined(meshes.into_iter().map(|mesh| (closed(&mesh), mesh)).map(|(closed, mesh)| (mesh, closed)).collect())
 }
 
 /// The objects' meshes in the scene's space, in f64.
-fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<ObjMesh>> {
-    let mut read: HashMap<PathBuf, ObjMesh> = HashMap::new();
-    let path_of = |entry: &ObjectEntry| match &entry.geometry {
-        Geometry::Mesh(path) => Some(folder.join(path)),
-        _ => None,
-    };
+fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>) -> Result<Vec<RawMesh>> {
     let has_picture = |entry: &ObjectEntry| file.materials[entry.material].images().next().is_some();
-    let with_uv: HashSet<PathBuf> =
-        file.objects.iter().filter(|entry| has_picture(entry)).filter_map(path_of).collect();
-    let mut uses: HashMap<PathBuf, usize> = HashMap::new();
-    file.objects.iter().filter_map(path_of).for_each(|path| *uses.entry(path).or_default() += 1);
+    let mut files = MeshFiles::new(file, folder);
     let mut out = Vec::with_capacity(file.objects.len());
     let mut unasked = 0;
     for entry in &file.objects {
@@ -204,21 +196,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
                 }
                 sphere(*centre, *radius, *rings, *segments)
             }
-            Geometry::Mesh(path) => {
-                let path = folder.join(path);
-                if !read.contains_key(&path) {
-                    let within = |e: Error| e.within(format_args!("{}: object {:?}", entry.at, entry.name));
-                    let load = if with_uv.contains(&path) { load_obj_with_uv } else { load_obj };
-                    let mesh = load(&path).map_err(within)?;
-                    said.extend(mesh.remarks.iter().map(|remark| format!("{}: {remark}", path.display())));
-                    read.insert(path.clone(), mesh);
-                }
-                let left = uses.entry(path.clone()).or_default();
-                *left = left.saturating_sub(1);
-                // The last one takes it: a large mesh is not there twice.
-                let mesh = if *left == 0 { read.remove(&path) } else { read.get(&path).cloned() };
-                mesh.unwrap_or_default()
-            }
+            Geometry::Mesh(path) => files.take(file, entry, &folder.join(path), said)?,
         };
         mesh.uv = match &entry.geometry {
             _ if !has_picture(entry) => None,
@@ -233,7 +211,7 @@ fn meshes(file: &SceneFile, folder: &Path, repair: bool, said: &mut Vec<String>)
 }
 
 /// Refuses an object that has a picture and no coordinates for it.
-fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> {
+fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &RawMesh) -> Result<()> {
     let (material, all) = (&file.materials[entry.material], mesh.triangles.len());
     let without = if material.images().next().is_some() { mesh.without_uv() } else { 0 };
     if without == 0 {
@@ -245,7 +223,7 @@ fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> 
     };
     Err(Error::scene(format!(
         "{}: object {:?}: its material {:?} has a picture, but {without} of {} of {mesh} {} no texture coordinates; export them \
-         (`vt`, at each corner of each face), or give the object another material",
+         (`vt` of OBJ, at each corner of each face; STL has none), or give the object another material",
         entry.at,
         entry.name,
         material.name,
@@ -254,7 +232,7 @@ fn need_uv(file: &SceneFile, entry: &ObjectEntry, mesh: &ObjMesh) -> Result<()> 
     )))
 }
 
-fn place(entry: &ObjectEntry, mut mesh: ObjMesh, repair: bool, said: &mut Vec<String>) -> ObjMesh {
+fn place(entry: &ObjectEntry, mut mesh: RawMesh, repair: bool, said: &mut Vec<String>) -> RawMesh {
     if entry.normals != NormalsChoice::Auto {
         mesh.normals = None;
     }
@@ -304,6 +282,6 @@ fn smooths_nothing(entry: &ObjectEntry, alone: usize, found: &Findings, transluc
 }
 
 /// Middle of the box around all meshes.
-fn centre<'a>(meshes: impl IntoIterator<Item = &'a ObjMesh>) -> Option<DVec3> {
-    meshes.into_iter().filter_map(ObjMesh::bounds).reduce(Aabb::join).map(|bounds| bounds.centre())
+fn centre<'a>(meshes: impl IntoIterator<Item = &'a RawMesh>) -> Option<DVec3> {
+    meshes.into_iter().filter_map(RawMesh::bounds).reduce(Aabb::join).map(|bounds| bounds.centre())
 }

@@ -1,6 +1,6 @@
 //! The file as typed, and the checked world made from it: camera, materials, meshes, units.
 //! Not for: rays, light transport. Read first: `file.rs`, `objects.rs`, `materials.rs`, `options.rs` (what can be typed;
-//! `tree.rs` remembers the lines, `difference.rs` names them), `world.rs` (what the renderer sees),
+//! `tree.rs` remembers the lines, `difference.rs` names them; `portion.rs` has parts of mesh files), `world.rs` (what the renderer sees),
 //! `load.rs` (the way from one to the other).
 
 mod body;
@@ -18,11 +18,13 @@ mod lights;
 mod load;
 mod masks;
 mod materials;
+mod mesh_files;
 mod objects;
 mod obstacle;
 mod obstacles;
 mod opaque;
 mod options;
+mod portion;
 mod precision;
 mod seams;
 mod sheets;
@@ -46,6 +48,7 @@ pub use obstacle::{Obstacle, ObstacleKind};
 pub use options::{
     EntrySampling, Estimator, FilterName, MethodName, MethodOptions, Orders, RenderOptions, Shape, Spread,
 };
+pub use portion::Portion;
 pub use textures::TextureEntry;
 pub use walkable::ExitanceBy;
 pub use world::{Dielectric, Emission, Material, Object, Scene, Surface, Translucent};

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 
 use super::materials::MaterialEntry;
 use super::options::named;
+use super::portion::{self, Asked, Portion};
 use super::tree::{Fields, Node, Value};
 use super::values::{named_value, switch, unknown, vector};
 use crate::error::Result;
@@ -18,6 +19,8 @@ pub struct ObjectEntry {
     pub name: String,
     /// Where its triangles come from.
     pub geometry: Geometry,
+    /// Which of them, of a mesh file.
+    pub portion: Portion,
     /// Index into the file's materials.
     pub material: usize,
     /// Which shading normals.
@@ -40,7 +43,7 @@ pub struct ObjectEntry {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Geometry {
-    /// An OBJ file, as typed: relative to the scene file.
+    /// A mesh file, as typed: relative to the scene file.
     Mesh(PathBuf),
     /// See [`crate::geometry::rectangle`].
     Rectangle {
@@ -75,8 +78,20 @@ named! {
     Smooth = "smooth"
 }
 
-const COMMON: [&str; 10] =
-    ["name", "mesh", "shape", "material", "normals", "flip", "priority", "body", "thickness", "transform"];
+const COMMON: [&str; 12] = [
+    "name",
+    "mesh",
+    "shape",
+    "part",
+    "material",
+    "materials",
+    "normals",
+    "flip",
+    "priority",
+    "body",
+    "thickness",
+    "transform",
+];
 
 const PRIORITY: &str = "a whole number; the higher one wins where bodies overlap";
 
@@ -90,47 +105,55 @@ pub(super) fn read(top: &Fields<'_>, materials: &[MaterialEntry]) -> Result<Vec<
     let numbers: HashMap<&str, usize> = materials.iter().zip(0..).map(|(m, i)| (m.name.as_str(), i)).collect();
     let mut taken: HashMap<String, String> = HashMap::with_capacity(list.len());
     let mut bodies: HashMap<String, usize> = HashMap::new();
+    // The place in `list` of each: an entry may be several objects, of parts of its mesh.
+    let mut typed = Vec::with_capacity(list.len());
     for (i, o) in list.iter().enumerate() {
         let geometry = geometry(o)?;
         let name = o.get("name", "a name in quotes", Node::text)?.map_or_else(|| format!("object {i}"), String::from);
-        if let Some(other) = taken.insert(name.clone(), o.at()) {
-            return Err(o.error_at("name", format_args!("{name:?} is taken ({other}); give each object its own")));
-        }
-        let asked = o.need("material", "the name of a [material.NAME]", Node::text)?;
-        let material = numbers.get(asked).copied().ok_or_else(|| {
-            let known: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-            let what = if known.is_empty() {
-                format!("{asked:?} does not exist; add a section [material.{asked}]")
-            } else {
-                unknown(asked, &known)
-            };
-            o.error_at("material", what)
-        })?;
-        let thickness = o.get("thickness", "a number of units above 0", length)?;
-        if thickness.is_some() && !materials[material].surface.is_translucent() {
-            return Err(o.error_at("thickness", no_inside(&name, asked)));
-        }
-        out.push(ObjectEntry {
-            name,
-            geometry,
-            material,
-            normals: named_value(o, "normals")?.unwrap_or(NormalsChoice::Auto),
-            flip: switch(o, "flip")?.unwrap_or(false),
-            body: o.get("body", "a name in quotes", |n| n.text().filter(|t| !t.is_empty()))?.map(String::from),
-            priority: o.get("priority", PRIORITY, |n| n.integer().and_then(|i| i32::try_from(i).ok()))?.unwrap_or(0),
-            thickness,
-            transform: transform(o)?,
-            at: o.at(),
-        });
-        let last = out.len() - 1;
-        if let Some(body) = &out[last].body {
-            let first = *bodies.entry(body.clone()).or_insert(last);
-            is_one_body(o, body, [&out[first], &out[last]], materials)?;
+        for Asked { portion, suffix, material: asked } in portion::read(o)? {
+            let name = name.clone() + &suffix;
+            if let Some(other) = taken.insert(name.clone(), o.at()) {
+                return Err(o.error_at("name", format_args!("{name:?} is taken ({other}); give each object its own")));
+            }
+            let material = numbers.get(asked.as_str()).copied().ok_or_else(|| {
+                let known: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+                let what = if known.is_empty() {
+                    format!("{asked:?} does not exist; add a section [material.{asked}]")
+                } else {
+                    unknown(&asked, &known)
+                };
+                o.error_at(if o.has("materials") { "materials" } else { "material" }, what)
+            })?;
+            let thickness = o.get("thickness", "a number of units above 0", length)?;
+            if thickness.is_some() && !materials[material].surface.is_translucent() {
+                return Err(o.error_at("thickness", no_inside(&name, &asked)));
+            }
+            out.push(ObjectEntry {
+                name,
+                geometry: geometry.clone(),
+                portion,
+                material,
+                normals: named_value(o, "normals")?.unwrap_or(NormalsChoice::Auto),
+                flip: switch(o, "flip")?.unwrap_or(false),
+                body: o.get("body", "a name in quotes", |n| n.text().filter(|t| !t.is_empty()))?.map(String::from),
+                priority: o
+                    .get("priority", PRIORITY, |n| n.integer().and_then(|i| i32::try_from(i).ok()))?
+                    .unwrap_or(0),
+                thickness,
+                transform: transform(o)?,
+                at: o.at(),
+            });
+            typed.push(i);
+            let last = out.len() - 1;
+            if let Some(body) = &out[last].body {
+                let first = *bodies.entry(body.clone()).or_insert(last);
+                is_one_body(o, body, [&out[first], &out[last]], materials)?;
+            }
         }
     }
     let numbers: HashMap<&str, usize> = out.iter().zip(0..).map(|(entry, i)| (entry.name.as_str(), i)).collect();
     for group in grouped(&out).iter().filter(|group| group.len() > 1) {
-        let (o, body) = (&list[group[1]], &out[group[1]].body);
+        let (o, body) = (&list[typed[group[1]]], &out[group[1]].body);
         let other = body.as_ref().and_then(|body| numbers.get(body.as_str())).map(|i| &out[*i]);
         if let Some(other) = other.filter(|other| other.body != *body) {
             let what = format_args!(
@@ -215,7 +238,7 @@ pub(super) fn grouped(objects: &[ObjectEntry]) -> Vec<Vec<usize>> {
 }
 
 fn geometry(o: &Fields<'_>) -> Result<Geometry> {
-    const MESH: &str = "the path of an OBJ file, relative to the scene file";
+    const MESH: &str = "the path of a mesh file, relative to the scene file";
     const SHAPES: &[&str] = &["rectangle", "sphere"];
     let keys = |more: &[&'static str]| [&COMMON[..], more].concat();
     let shape = o.get("shape", "\"rectangle\" or \"sphere\"", Node::text)?;

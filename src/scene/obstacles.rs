@@ -4,7 +4,7 @@
 use super::insides::{Found, Nests, Partner};
 use super::seams::{MOSTLY_HOLES, seams};
 use super::{Object, Obstacle, ObstacleKind, Scene};
-use crate::geometry::{Contact, Mesh, ObjMesh, Part, Seek, Solid, Union, lying, meeting, mended};
+use crate::geometry::{Contact, Mesh, Part, RawMesh, Seek, Solid, Union, lying, meeting, mended};
 use crate::math::{Aabb, DVec3};
 use crate::words::{self, counted, either, percent};
 use std::collections::HashSet;
@@ -270,7 +270,7 @@ fn alone(scene: &Scene, body: &Shell<'_>, out: &mut Vec<Obstacle>) -> bool {
 /// The mesh as --repair would have it.
 fn welded(mesh: &Mesh) -> Mesh {
     let (positions, triangles) = (mesh.positions.clone(), mesh.triangles.clone());
-    mended(ObjMesh { positions, triangles, ..ObjMesh::default() }).0.recentred(DVec3::ZERO)
+    mended(RawMesh { positions, triangles, ..RawMesh::default() }).0.recentred(DVec3::ZERO)
 }
 
 /// Parts in one another, and a part that passes through itself.

@@ -6,7 +6,7 @@ use super::options::MethodName;
 use super::{Material, Object, Surface};
 use crate::bssrdf::ModelName;
 use crate::error::{Error, Result};
-use crate::geometry::{MITER_LIMIT, NoSheet, ObjMesh, Precision, Seek, Solid, examine, meeting, thickened};
+use crate::geometry::{MITER_LIMIT, NoSheet, Precision, RawMesh, Seek, Solid, examine, meeting, thickened};
 use crate::math::DVec3;
 use crate::words::{counted, digits, percent, place, short};
 
@@ -16,7 +16,7 @@ const OFFSETS: f64 = 2.0;
 const SAME: f64 = 1e-3;
 
 /// The body of `entry`, whose mesh is `mesh`: the same mesh where it has no thickness.
-pub(super) fn body(entry: &ObjectEntry, mesh: ObjMesh, said: &mut Vec<String>) -> Result<ObjMesh> {
+pub(super) fn body(entry: &ObjectEntry, mesh: RawMesh, said: &mut Vec<String>) -> Result<RawMesh> {
     let Some(thickness) = entry.thickness else { return Ok(mesh) };
     let found = examine(&mesh.recentred(DVec3::ZERO));
     if found.duplicates > 0 {

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)] // a mesh of this file that a backend refuses has failed
 
 use marmor::bssrdf::ModelName;
-use marmor::geometry::{Findings, Mesh, ObjMesh, sphere};
+use marmor::geometry::{Findings, Mesh, RawMesh, sphere};
 use marmor::integrator::{Left, View, VolumePath, VolumePathOptions};
 use marmor::math::{DVec3, Rgb, Vec3, hash};
 use marmor::optics::Medium;
@@ -171,6 +171,6 @@ fn slab(thickness: f32, half: f32) -> Mesh {
     Mesh { positions, triangles, ..Mesh::default() }
 }
 
-fn ball(made: ObjMesh) -> Mesh {
+fn ball(made: RawMesh) -> Mesh {
     Mesh { positions: made.positions, triangles: made.triangles, ..Mesh::default() }
 }

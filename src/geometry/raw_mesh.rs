@@ -3,36 +3,38 @@
 
 use std::collections::HashMap;
 
-use super::{CornerUv, Mesh, Normals};
+use super::{CornerUv, Mesh, Normals, Parts};
 use crate::math::{Aabb, DAffine3, DVec3, Vec3};
 
-/// What an OBJ file or a shape holds, before any transform.
+/// What a mesh file or a shape holds, before any transform.
 #[derive(Clone, Debug, Default)]
-pub struct ObjMesh {
+pub struct RawMesh {
     /// Positions as typed.
     pub positions: Vec<DVec3>,
     /// Indices into `positions`, three a triangle.
     pub triangles: Vec<[u32; 3]>,
     /// Normals, where there are any.
-    pub normals: Option<ObjNormals>,
+    pub normals: Option<RawNormals>,
     /// Texture coordinates, where there are any: one entry for each triangle, `None` of one without.
     pub uv: Option<Vec<Option<CornerUv>>>,
     /// For each vertex a number: of vertices at one place those of one number are one. Empty where all are.
     pub groups: Vec<u32>,
+    /// What its file calls its triangles; empty where nobody asks for parts, and after anything that numbers triangles anew.
+    pub parts: Parts,
     /// What a user should hear of: what the file has besides, and what is odd about its polygons.
     pub remarks: Vec<String>,
 }
 
 /// Normals with indices of their own; a triangle may be without.
 #[derive(Clone, Debug, Default)]
-pub struct ObjNormals {
+pub struct RawNormals {
     /// Unit vectors.
     pub vectors: Vec<DVec3>,
     /// One entry for each triangle of the mesh; `None` shades it with its own normal.
     pub triangles: Vec<Option<[u32; 3]>>,
 }
 
-impl ObjMesh {
+impl RawMesh {
     /// The box around all vertices; `None` without vertices.
     pub fn bounds(&self) -> Option<Aabb> {
         (!self.positions.is_empty()).then(|| Aabb::around(self.positions.iter().copied()))
@@ -54,7 +56,7 @@ impl ObjMesh {
         let mut all = Self::default();
         let shaded = parts.iter().any(|(mesh, _)| mesh.normals.is_some());
         let textured = parts.iter().any(|(mesh, _)| mesh.uv.is_some());
-        let (mut normals, mut uv) = (ObjNormals::default(), Vec::new());
+        let (mut normals, mut uv) = (RawNormals::default(), Vec::new());
         for (number, (mesh, closed)) in (1..).zip(parts) {
             let (base, first) = (all.positions.len() as u32, normals.vectors.len() as u32);
             all.groups.extend(vec![if closed { number } else { 0 }; mesh.positions.len()]);
@@ -156,7 +158,7 @@ impl ObjMesh {
             let t = t.map(|i| welded[i as usize]);
             t.iter().all(|&i| vectors[i as usize] != DVec3::ZERO).then_some(t)
         });
-        self.normals = Some(ObjNormals { triangles: triangles.collect(), vectors });
+        self.normals = Some(RawNormals { triangles: triangles.collect(), vectors });
         self
     }
 
