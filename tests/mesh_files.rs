@@ -9,7 +9,7 @@ mod rendering;
 
 use marmor::ErrorKind;
 use marmor::geometry::{RawMesh, load_mesh, load_mesh_with_uv};
-use marmor::scene::Estimator;
+use marmor::scene::{Estimator, SceneFile};
 use meshes::{Shape, base64, bits, glb, gzip, read, written};
 use parts::{camera, mesh, sky, translucent};
 use refusals::{damaged, failure};
@@ -321,6 +321,11 @@ fn buffers_of_gltf_may_be_files_beside_it() {
     );
     std::fs::write(folder.path().join("my buffer.bin"), &bytes).unwrap();
     assert_eq!(bits(&load_mesh_with_uv(&path).unwrap()), bits(&read("m.glb", &shape.glb()).unwrap()));
+    // What a scene reads must not be written over.
+    let text = "[camera]\nposition = [0, 0, 9]\nlook_at = [0, 0, 0]\nfov = 30\nresolution = [2, 2]\n[[object]]\nmesh = \"m.gltf\"\nmaterial = \"m\"\n\
+                [material.m]\ntype = \"diffuse\"\nalbedo = 1\n";
+    let file = SceneFile::parse(text, &folder.path().join("scene.toml")).unwrap();
+    assert!(file.inputs().iter().any(|(_, input)| *input == folder.path().join("my buffer.bin")));
     // Whole numbers that stand for shares of 1, as quantized files have them, four bytes apart.
     let bytes: Vec<u8> = [[0, 0, 0, 9], [127, 0, 0, 9], [0, 0x81, 0x80, 9]].concat();
     let json = "{\"asset\":{\"version\":\"2.0\"},\"extensionsRequired\":[\"KHR_mesh_quantization\"],\"nodes\":[{\"mesh\":0}],\

@@ -1,7 +1,7 @@
 //! glTF 2 files, as text (`.gltf`) and in one piece (`.glb`): the meshes of the nodes of their scene.
 
 use super::builder::Builder;
-use super::gltf_data::{Data, SCALAR, VEC2, VEC3};
+use super::gltf_data::{Data, SCALAR, VEC2, VEC3, file_of};
 use super::gltf_json::{Node, Primitive, Root, bytes_as_read, split};
 use super::loading::{Budget, MAX_COUNT, require_bytes};
 use super::{Label, RawMesh, unit_or_zero};
@@ -10,7 +10,7 @@ use crate::math::{DAffine3, DVec3};
 use crate::words::counted;
 use glam::{DMat4, DQuat};
 use std::io::{BufRead, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Extensions that a file may require: what they change is not read, or is read as it stands.
 const HARMLESS: &[&str] =
@@ -66,6 +66,18 @@ pub(super) fn read(mut source: Box<dyn BufRead + '_>, path: &Path, uv: bool) -> 
 }
 
 /// All bytes, as far as there is memory for them.
+/// The buffers of a glTF file that are files of their own.
+pub(super) fn beside(mut source: Box<dyn BufRead + '_>, path: &Path) -> Vec<PathBuf> {
+    let Ok(bytes) = read_all(&mut source, path) else { return Vec::new() };
+    let Ok((json, _)) = split(&bytes) else { return Vec::new() };
+    let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
+    if require_bytes(bytes_as_read(json)).is_err() {
+        return Vec::new();
+    }
+    let Ok(root) = serde_json::from_slice::<Root>(json) else { return Vec::new() };
+    root.buffers.iter().filter_map(|buffer| file_of(buffer.uri.as_deref()?, path)).collect()
+}
+
 fn read_all(source: &mut dyn BufRead, path: &Path) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     loop {

@@ -4,7 +4,7 @@ use super::gltf_json::{Accessor, Root};
 use super::loading::require_bytes;
 use crate::error::{Error, Result};
 use crate::input;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The buffers of a file, each read when it is first asked for.
 pub(super) struct Data<'a> {
@@ -150,19 +150,24 @@ impl<'a> Data<'a> {
             return bytes
                 .ok_or_else(|| self.wrong(format_args!("the data of buffer {index} are no base64; export again")));
         }
-        let is_scheme = |s: &str| s.len() > 1 && s.bytes().all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b));
-        if uri.split_once(':').is_some_and(|(scheme, _)| is_scheme(scheme)) {
+        let Some(file) = file_of(uri, self.path) else {
             let at = super::shown(uri);
             return Err(self.wrong(format!("buffer {index} is elsewhere ({at}); save it as a file beside it")));
-        }
-        let folder = self.path.parent().unwrap_or(Path::new(""));
-        let bytes = input::read_all(&folder.join(unescaped(uri)), 3).map_err(|e| e.within(self.path.display()))?;
+        };
+        let bytes = input::read_all(&file, 3).map_err(|e| e.within(self.path.display()))?;
         if (bytes.len() as u64) < length {
             let n = bytes.len();
             return Err(self.wrong(format!("{uri:?} has {n} bytes of {length}; copy or export it again")));
         }
         Ok(bytes)
     }
+}
+
+/// The file that a uri of the glTF file at `path` names; `None` where it is data, or elsewhere.
+pub(super) fn file_of(uri: &str, path: &Path) -> Option<PathBuf> {
+    let is_scheme = |s: &str| s.len() > 1 && s.bytes().all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b));
+    let elsewhere = uri.split_once(':').is_some_and(|(scheme, _)| is_scheme(scheme));
+    (!elsewhere).then(|| path.parent().unwrap_or(Path::new("")).join(unescaped(uri)))
 }
 
 /// The text with `%20` and the like as the characters that they stand for.

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::{RawMesh, gltf, obj, ply, stl};
 use crate::error::{Error, Result};
@@ -35,14 +35,27 @@ pub fn load_mesh_with_uv(path: &Path) -> Result<RawMesh> {
     load(path, true)
 }
 
-fn load(path: &Path, uv: bool) -> Result<RawMesh> {
+/// Files beside `path` of which its mesh is read too, as buffers of glTF are. None where it cannot be read, which is said by [`load_mesh`].
+pub fn files_beside(path: &Path) -> Vec<PathBuf> {
+    match open(path) {
+        Ok((source, ending)) if ["gltf", "glb"].contains(&ending.as_str()) => gltf::beside(source, path),
+        _ => Vec::new(),
+    }
+}
+
+/// What is in the file, unpacked, and the ending of its name.
+fn open(path: &Path) -> Result<(Box<dyn BufRead>, String)> {
     let (file, _) = input::open(path)?;
     let (ending, packed) = ending(path);
     let file = BufReader::with_capacity(1 << 16, file);
-    let source: Box<dyn BufRead> = match packed {
-        true => Box::new(BufReader::with_capacity(1 << 16, Unpacked(MultiGzDecoder::new(file)))),
-        false => Box::new(file),
-    };
+    Ok(match packed {
+        true => (Box::new(BufReader::with_capacity(1 << 16, Unpacked(MultiGzDecoder::new(file)))), ending),
+        false => (Box::new(file), ending),
+    })
+}
+
+fn load(path: &Path, uv: bool) -> Result<RawMesh> {
+    let (source, ending) = open(path)?;
     match ending.as_str() {
         "obj" => obj::read(source, path, uv),
         "ply" => ply::read(source, path, uv),

@@ -49,7 +49,7 @@ pub use curvature::Curvature;
 pub use doctor::{Findings, Mended, examine, mended};
 pub use loading::LOADING_BYTES;
 pub use mesh::{CornerUv, Mesh, Normals, Precision, SurfacePoint};
-pub use mesh_file::{MESH_ENDINGS, load_mesh, load_mesh_with_uv};
+pub use mesh_file::{MESH_ENDINGS, files_beside, load_mesh, load_mesh_with_uv};
 pub use morton::morton_code;
 pub use obj::write_obj;
 pub use parts::{Label, PartKind, Parts};

@@ -13,6 +13,7 @@ use super::tree::{Fields, Node, Value};
 use super::values::{UNIT, named_value, switch, unit, whole, whole_or_none};
 use super::{Geometry, difference};
 use crate::error::{Error, Result};
+use crate::geometry::files_beside;
 use crate::input;
 
 /// A scene file whose numbers are in range and whose names exist. docs/scene-format.md lists every key.
@@ -113,7 +114,7 @@ impl SceneFile {
         root
     }
 
-    /// Every file that the scene names, with what it is: meshes once each, the picture of the environment, those of materials.
+    /// Every file that the scene names, with what it is: meshes once each, the picture of the environment, those of materials, and what meshes are read from beside their files.
     pub fn inputs(&self) -> Vec<(String, PathBuf)> {
         let folder = self.path.parent().unwrap_or(Path::new(""));
         let mut seen = HashSet::new();
@@ -121,12 +122,20 @@ impl SceneFile {
             Geometry::Mesh(path) => Some((format!("the mesh of object {:?}", object.name), path)),
             _ => None,
         });
+        let mut looked_at = HashSet::new();
+        let beside = self.objects.iter().filter_map(|object| match &object.geometry {
+            Geometry::Mesh(path) if looked_at.insert(path) => {
+                Some((format!("a buffer of the mesh of object {:?}", object.name), files_beside(&folder.join(path))))
+            }
+            _ => None,
+        });
+        let beside = beside.flat_map(|(what, paths)| paths.into_iter().map(move |path| (what.clone(), path)));
         let sky = self.environment.image.iter().map(|path| ("the picture of [environment]".to_string(), path));
         let pictures = self.materials.iter().flat_map(|material| {
             material.images().map(|entry| (format!("the picture of material {:?}", material.name), &entry.image))
         });
         let all = meshes.chain(sky).chain(pictures).map(|(what, path)| (what, folder.join(path)));
-        all.filter(|(_, path)| seen.insert(path.clone())).collect()
+        all.chain(beside).filter(|(_, path)| seen.insert(path.clone())).collect()
     }
 
     fn from_tree(root: Node, path: &Path) -> Result<Self> {
