@@ -79,11 +79,11 @@ fn each_half_is_as_rough_as_the_picture_says() {
     let (both, smooth, rough) =
         (render("{ image = \"halves.exr\", wrap = \"clamp\" }"), render("0.25"), render("0.75"));
     let at = |image: &Image, x: u32| image.get(x, 8).unwrap()[0];
-    // Between two steps, a quarter of the way from one to the next: the highlight hangs on the fourth power.
+    // Between two steps, a quarter of the way from one to the next: the highlight hangs on the fourth power, of which the mixture has the mean.
     let between = 0.25 + 0.25 / 32.0;
     picture(folder.path(), "between.exr", |_, _| Rgb::splat(between));
     let (mixed, right) = (render("{ image = \"between.exr\" }"), render(&between.to_string()));
-    assert!((at(&mixed, 8) / at(&right, 8) - 1.0).abs() < 0.01, "{} {}", at(&mixed, 8), at(&right, 8));
+    assert!((at(&mixed, 8) / at(&right, 8) - 1.0).abs() < 0.04, "{} {}", at(&mixed, 8), at(&right, 8));
     assert!(at(&smooth, 3) > 5.0 * at(&rough, 3));
     for (x, right) in [(3, &smooth), (12, &rough)] {
         assert!((at(&both, x) / at(right, x) - 1.0).abs() < 1e-4);

@@ -1,4 +1,5 @@
 //! Pigment on the boundaries of bodies, by every method: light passes it on its way in and on its way out, and nowhere else.
+#![allow(clippy::print_stdout)] // with --nocapture, the figures of a run
 #![allow(clippy::unwrap_used)] // a scene of this file that does not load has failed
 
 mod parts;
@@ -67,6 +68,32 @@ fn light_passes_pigment_twice() {
         let [all, half, none] = channels(&picture(&scene, shape, bounces, passes, 1));
         let share = (half - none) / (all - none);
         assert!((share - 0.25).abs() < 1e-4, "{medium:?} lamp {lamp} {shape:?} {bounces}: {share}");
+    }
+}
+
+/// One ball is lit by a lamp, another by the first alone, and seen: pigment on either of them is passed twice.
+#[test]
+fn light_from_body_to_body_passes_the_pigment_of_both() {
+    for (first, second) in [("tint = [1, 0.5, 0]", ""), ("", "tint = [1, 0.5, 0]")] {
+        let scene = load(
+            &(camera([1.5, 0.4, 9.0], [1.1, 0.4, 0.0], 6.0, [6, 6])
+                + &rectangle("lamp", [-1.6, 4.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 0.5], "lamp")
+                + &emissive("lamp", 50)
+                + &rectangle("screen", [0.0, 3.7, 0.0], [0.0, 2.5, 0.0], [0.0, 0.0, 9.0], "black")
+                + &parts::diffuse("black", 0)
+                + &sphere("first", [-1.4, 0.0, 0.0], 1.0, 24, "one")
+                + &sphere("second", [1.4, 0.0, 0.0], 1.0, 24, "two")
+                + &translucent("one", &format!("sigma_s = 4\nsigma_a = 0.1\ng = 0\neta = 1.4\n{first}"))
+                + &translucent("two", &format!("sigma_s = 4\nsigma_a = 3\ng = 0\neta = 1.4\n{second}"))),
+        );
+        for shape in [None, Some((Shape::HalfSpace, 4000)), Some((Shape::Walked, 8000))] {
+            let [all, half, none] = channels(&picture(&scene, shape, 8, 16, 1));
+            let share = (half - none) / (all - none);
+            println!("{first:?} {second:?} {shape:?}: {share} of {all}");
+            // What goes to and fro more often has passed more; patches of walks are not linear in the light.
+            let within = if matches!(shape, Some((Shape::Walked, _))) { 0.04 } else { 0.01 };
+            assert!((share - 0.25).abs() < within, "{first:?} {second:?} {shape:?}: {share} of {all}");
+        }
     }
 }
 
