@@ -113,7 +113,7 @@ fn a_white_body_in_a_white_well_is_white() {
         let with = |seed| options(Estimator::Cut, 32768, seed);
         let straight = means(&scene, 2, 4, |seed| subsurface(&scene, SubsurfaceOptions { bounces: 0, ..with(seed) }));
         assert!(straight[0].0 < most, "{straight:?}");
-        for c in means(&scene, 16, 10, |seed| subsurface(&scene, with(seed))) {
+        for c in means(&scene, 10, 10, |seed| subsurface(&scene, with(seed))) {
             agree(c, (1.0, BALANCE), Within { errors: 5.0, noise }, "in a well");
         }
     }
@@ -128,8 +128,8 @@ fn a_near_field_has_the_light_that_the_cache_has() {
     let of = |samples| move |estimator| move |seed| options(estimator, samples, seed);
     let near = Subsurface::new(&scene, of(2048)(Estimator::Cut)(1)).unwrap();
     assert_eq!(near.near_fields(), 2, "the near field is what this is about");
-    let near = means(&scene, 24, 10, |seed| subsurface(&scene, of(2048)(Estimator::Cut)(seed)));
-    let cache = means(&scene, 40, 10, |seed| subsurface(&scene, of(16384)(Estimator::Thinned)(seed)));
+    let near = means(&scene, 14, 10, |seed| subsurface(&scene, of(2048)(Estimator::Cut)(seed)));
+    let cache = means(&scene, 20, 10, |seed| subsurface(&scene, of(16384)(Estimator::Thinned)(seed)));
     for c in 0..3 {
         agree(near[c], cache[c], WITHIN, "near field against cache");
     }
@@ -146,8 +146,8 @@ fn light_passes_straight_through_clear_bodies() {
     let start = text.find("sigma_s").unwrap();
     let end = text.find("eta = 1.3").unwrap() + "eta = 1.3".len();
     let scene = load(&format!("{}{clear}{}", &text[..start], &text[end..]));
-    let model = means(&scene, 96, 10, |seed| subsurface(&scene, options(Estimator::Cut, 4096, seed)));
-    let truth = means(&scene, 96, 10, |seed| {
+    let model = means(&scene, 48, 10, |seed| subsurface(&scene, options(Estimator::Cut, 4096, seed)));
+    let truth = means(&scene, 48, 10, |seed| {
         let options = VolumePathOptions { orders: Orders::All, photons: 0, seed, ..Default::default() };
         VolumePath::new(&scene, options).unwrap()
     });
