@@ -235,7 +235,7 @@ fn a_replay_shows_the_sample_of_the_render() {
 fn an_interruption_in_the_first_pass_is_an_interruption() {
     let folder = folder();
     let folder = folder.path();
-    let slow = ["-D", "method.cache_samples=100000", "-D", "method.estimator=notes"];
+    let slow = ["-D", "method.cache_samples=16000", "-D", "method.estimator=notes"];
     let call = ["render", "scene.toml", "-o", "x.exr", "--layers", "variance,Z", "--spp", "40"];
     let child = command(folder, &[&call[..], &slow].concat()).stderr(Stdio::piped()).spawn().unwrap();
     // Once it listens for signals; before, SIGTERM ends any program.
