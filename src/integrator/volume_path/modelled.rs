@@ -1,12 +1,13 @@
 //! Paths over bodies whose light a model has: there it is asked for, and only what the model lacks is walked.
 
-use super::camera::{CameraPath, enter};
+use super::camera::CameraPath;
 use super::connect::Scratch;
 use super::draws::PathSampler;
 use super::glass;
 use super::interior::{Edge, Interior, MOST_SURFACES, WalkObserver, russian_roulette};
 use super::jumps::{Balls, Jumps};
 use super::nesting::{Entry, Stack};
+use super::seen::enter;
 use super::spectrum::Spectrum;
 use super::{Asked, CLEARANCE_CELLS, VolumePath, VolumePathOptions, endless, throughs};
 use crate::bssrdf::Exit;
