@@ -297,7 +297,7 @@ fn describe(surface: &Surface) -> Vec<String> {
 /// Diffuse reflectance of a half space under even light, by pigment of the same place inwards and outwards.
 fn colour(t: &Translucent) -> [f64; 3] {
     let half_space = HalfSpace::new(t.medium.eta.into());
-    let tint = t.tint.as_ref().map_or(Rgb::WHITE, |tint| tint.shares().map(|share| share * share).mean());
+    let tint = t.tint.as_ref().map_or(Rgb::WHITE, |tint| tint.map(|share| share * share).mean());
     let reflectance = ChannelOptics::of(&t.medium).map(|k| half_space.even_reflectance(k.absorbed_prime));
     std::array::from_fn(|c| reflectance[c] * f64::from(tint[c]))
 }

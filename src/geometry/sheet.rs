@@ -188,7 +188,6 @@ impl Around {
 /// A surface that is closed, has no area, hangs together at edges of three faces, has one side only, or bends too sharply.
 pub fn thickened(mesh: &RawMesh, thickness: f64) -> Result<Thick, NoSheet> {
     let (surface, edges) = Surface::new(mesh)?;
-    let pick = |turn: bool, [a, b, c]: [u32; 3]| if turn { [a, c, b] } else { [a, b, c] };
     let front: Vec<[u32; 3]> = surface.triangles.iter().map(|&(t, turn)| pick(turn, mesh.triangles[t])).collect();
     let mut around = vec![Around::NONE; mesh.positions.len()];
     for &triangle in &front {
@@ -232,9 +231,7 @@ pub fn thickened(mesh: &RawMesh, thickness: f64) -> Result<Thick, NoSheet> {
     let mut triangles = front.clone();
     triangles.extend(front.iter().map(|&[a, b, c]| [a, c, b].map(back)));
     let mut uv = mesh.uv.as_ref().map(|uv| {
-        let own =
-            surface.triangles.iter().map(|&(t, turn)| uv[t].map(|[a, b, c]| if turn { [a, c, b] } else { [a, b, c] }));
-        let own: Vec<_> = own.collect();
+        let own: Vec<_> = surface.triangles.iter().map(|&(t, turn)| uv[t].map(|uv| pick(turn, uv))).collect();
         let behind = own.iter().map(|uv| uv.map(|[a, b, c]| [a, c, b]));
         own.iter().copied().chain(behind).collect::<Vec<_>>()
     });
@@ -260,6 +257,11 @@ pub fn thickened(mesh: &RawMesh, thickness: f64) -> Result<Thick, NoSheet> {
         RawNormals { vectors, triangles: all }
     });
     Ok(Thick { mesh: RawMesh { triangles, normals, uv, remarks: mesh.remarks.clone(), ..body }, blunted })
+}
+
+/// What belongs to the corners of a triangle, of one that is turned round in the other order.
+fn pick<T>(turn: bool, [a, b, c]: [T; 3]) -> [T; 3] {
+    if turn { [a, c, b] } else { [a, b, c] }
 }
 
 /// The edge of a triangle whose corners are at two places, in its own direction.

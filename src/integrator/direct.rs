@@ -8,7 +8,7 @@ use crate::geometry::SurfacePoint;
 use crate::light::{Lights, emitted};
 use crate::math::Rgb;
 use crate::scene::{Scene, Surface};
-use crate::surface::{Bsdf, Lambertian, Textured};
+use crate::surface::{Bsdf, Colour, Lambertian, Textured};
 use crate::tally::Tally;
 use std::sync::Arc;
 
@@ -37,10 +37,10 @@ pub(super) fn stand_ins(scene: &Scene) -> Result<Vec<Option<Arc<dyn Bsdf>>>> {
         let Some(inside) = &surface.inside else { return Ok(None) };
         let total = inside.build()?.total();
         // Light goes in and out by pigment of about the same place.
-        let albedo =
-            inside.tint.as_ref().map(|tint| Arc::new(tint.shares().map(|t| total.map(|v| v.min(1.0)) * t * t)));
-        let stand_in: Arc<dyn Bsdf> = match albedo {
-            Some(albedo) => Arc::new(Textured { albedo, roughness: 0.0 }),
+        let tinted = inside.tint.as_ref().map(|tint| tint.map(|t| total.map(|v| v.min(1.0)) * t * t));
+        let stand_in: Arc<dyn Bsdf> = match tinted {
+            Some(Colour::Picture(albedo)) => Arc::new(Textured { albedo, roughness: 0.0 }),
+            Some(Colour::Even(albedo)) => Arc::new(Lambertian { albedo }),
             None => Arc::new(Lambertian { albedo: total }),
         };
         Ok(Some(stand_in))

@@ -9,7 +9,7 @@ use crate::bssrdf::ModelName;
 use crate::error::{Error, Result};
 use crate::math::Rgb;
 use crate::optics::{Look, Medium, Preset};
-use crate::surface::{Bsdf as _, Relief, RoughBoundary, Texture, Tint};
+use crate::surface::{Bsdf as _, Colour, Relief, RoughBoundary, Texture};
 use std::sync::Arc;
 
 /// One material, its coefficients already per scene unit.
@@ -87,7 +87,6 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
         let plain = opaque.as_ref().map(OpaqueEntry::plain);
         let mut pictures = Pictures::read(&m, opaque)?;
         let surface = match kind {
-            _ if plain.is_some() => plain.map(Surface::opaque).unwrap_or_else(|| Surface::diffuse(Rgb::BLACK)),
             "translucent" => translucent(&m, unit_in_mm.unwrap_or(1.0), (&mut without_thickness, &mut pictures))?,
             "emissive" => {
                 m.only("an emissive material", &["type", "radiance", "two_sided"])?;
@@ -100,7 +99,7 @@ pub(super) fn read(top: &Fields<'_>, unit_in_mm: Option<f64>) -> Result<Vec<Mate
                 let what = "a mirror is type = \"conductor\" with `reflectance = 1`, or with a `metal`";
                 return Err(m.error_at("type", what));
             }
-            other => return Err(m.error_at("type", unknown(other, KINDS))),
+            other => plain.map(Surface::opaque).ok_or_else(|| m.error_at("type", unknown(other, KINDS)))?,
         };
         Ok(MaterialEntry { name: name.to_string(), surface, pictures, at: m.at(), without_thickness })
     });
@@ -127,7 +126,7 @@ impl MaterialEntry {
             surface.bsdf = opaque.pictured(loader)?;
         }
         if let (Some(image), Some(inside)) = (tint, &mut surface.inside) {
-            inside.dye(Tint::picture(loader.load(image)?));
+            inside.dye(Colour::Picture(loader.load(image)?));
         }
         if let (Some((image, look, scale)), Some(inside)) = (colour, &mut surface.inside) {
             coloured(inside, image, loader.load(image)?, (*look, *scale))
@@ -166,7 +165,7 @@ fn coloured(
     let medium = look.medium().map_err(|e| e.to_string())?;
     inside.medium = scaled(medium, scale).checked().map_err(|e| e.to_string())?;
     // What enters and leaves at one point has been through the pigment twice.
-    inside.dye(Tint::picture(Arc::new(texture.map(|t| Rgb::from_fn(|c| (t[c] / largest[c]).sqrt())))));
+    inside.dye(Colour::Picture(Arc::new(texture.map(|t| Rgb::from_fn(|c| (t[c] / largest[c]).sqrt())))));
     inside.build().map_err(|e| e.to_string())?;
     Ok(())
 }
@@ -265,7 +264,7 @@ fn translucent(
         source,
     };
     if let Some(share) = tint {
-        translucent.dye(Tint::even(rgb(share)));
+        translucent.dye(Colour::Even(rgb(share)));
     }
     match translucent.build().map_err(|e| m.error(e)) {
         Err(e) if translucent.model == ModelName::SLAB && translucent.thickness.is_none() => {

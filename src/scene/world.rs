@@ -6,7 +6,7 @@ use crate::error::Result;
 use crate::geometry::{Findings, Mesh};
 use crate::math::{DVec3, Rgb};
 use crate::optics::Medium;
-use crate::surface::{Boundary, Bsdf, Lambertian, Relief, RoughBoundary, Texture, Tint};
+use crate::surface::{Boundary, Bsdf, Colour, Lambertian, Relief, RoughBoundary, Texture};
 use std::sync::Arc;
 
 /// A scene whose numbers have been checked.
@@ -136,9 +136,9 @@ impl Surface {
 
     /// The pictures on it, for which points need texture coordinates.
     pub fn pictures(&self) -> impl Iterator<Item = &Arc<Texture>> {
-        let tint = self.inside.as_ref().and_then(|inside| inside.tint.as_ref()).filter(|tint| tint.is_picture());
+        let tint = self.inside.as_ref().and_then(|inside| inside.tint.as_ref()?.picture());
         let relief = self.relief.as_ref().map(|relief| relief.texture());
-        self.bsdf.textures().into_iter().chain(tint.map(Tint::shares)).chain(relief).chain(&self.opacity)
+        self.bsdf.textures().into_iter().chain(tint).chain(relief).chain(&self.opacity)
     }
 
     /// What fills the body behind it; of translucent and clear bodies.
@@ -188,8 +188,8 @@ pub struct Translucent {
     pub exit_normalisation: bool,
     /// Its boundary, if that is not smooth.
     pub rough: Option<Arc<RoughBoundary>>,
-    /// Pigment on its boundary.
-    pub tint: Option<Tint>,
+    /// Pigment on its boundary: share in [0, 1] of each channel that passes, each time.
+    pub tint: Option<Colour>,
     /// Where the numbers come from, for logs and headers.
     pub source: String,
 }
@@ -237,8 +237,8 @@ impl Scene {
 
 impl Translucent {
     /// Lays pigment on the boundary.
-    pub fn dye(&mut self, tint: Tint) {
-        self.source = format!("{}, {}", self.source, tint.text());
+    pub fn dye(&mut self, tint: Colour) {
+        self.source = format!("{}, tint {}", self.source, tint.text());
         self.tint = Some(tint);
     }
 

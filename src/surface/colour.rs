@@ -32,6 +32,14 @@ impl Colour {
         }
     }
 
+    /// Each value made into another, in [0, 1].
+    pub fn map(&self, of: impl Fn(Rgb) -> Rgb) -> Self {
+        match self {
+            Self::Even(colour) => Self::Even(of(*colour)),
+            Self::Picture(picture) => Self::Picture(Arc::new(picture.map(of))),
+        }
+    }
+
     /// The picture, if it is one.
     pub fn picture(&self) -> Option<&Arc<Texture>> {
         match self {
@@ -44,7 +52,7 @@ impl Colour {
     pub fn text(&self) -> String {
         match self {
             Self::Even(colour) => format!("{:?}", colour.0),
-            Self::Picture(picture) => picture.text(),
+            Self::Picture(picture) => format!("by {}", picture.text()),
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::microfacets::local;
 use super::rough_boundary::Side;
-use super::{Bsdf, BsdfSample, RoughBoundary, Tint};
+use super::{Bsdf, BsdfSample, Colour, RoughBoundary};
 use crate::geometry::SurfacePoint;
 use crate::math::{DVec3, Rgb, Vec3, frame};
 use crate::optics::{reflect, reflectance, refract, transmittance};
@@ -15,12 +15,14 @@ pub struct Interface {
     pub eta: f32,
     /// If it is not smooth.
     pub rough: Option<Arc<RoughBoundary>>,
-    /// Pigment on it.
-    pub tint: Option<Tint>,
+    /// Pigment on it: see [`Self::tint`].
+    pub tint: Option<Colour>,
 }
 
 impl Interface {
-    /// Share of what is let through at a point that passes its pigment, each channel in [0, 1].
+    /// Share of what is let through at a point, inwards or outwards, that passes its pigment, each channel in [0, 1]. That is a layer too thin to scatter on
+    /// the inner side, which what is reflected has not been through: light that enters at x and leaves at y is worth tint(x) tint(y) times what
+    /// it is without, the same both ways round, and never more than has entered.
     #[inline]
     pub fn tint(&self, at: &SurfacePoint) -> Rgb {
         self.tint.as_ref().map_or(Rgb::WHITE, |tint| tint.at(at))

@@ -14,7 +14,6 @@ mod relief;
 mod rough_boundary;
 mod texture;
 mod textured;
-mod tint;
 
 use crate::geometry::SurfacePoint;
 use crate::math::{Rgb, Vec3};
@@ -31,7 +30,6 @@ pub use rough_boundary::RoughBoundary;
 use std::sync::Arc;
 pub use texture::{Texture, Wrap};
 pub use textured::Textured;
-pub use tint::Tint;
 
 /// Reflection and transmission at a point of a surface. Directions are unit vectors that lead away from it: `wo` to where light
 /// goes, `wi` to where it comes from.

@@ -15,7 +15,7 @@ use crate::math::{DVec3, Rgb, Vec3};
 use crate::query::{Hit, Ray};
 use crate::sampling::PixelStream;
 use crate::scene::{Orders, Surface};
-use crate::surface::{Bsdf, RoughBoundary, Tint};
+use crate::surface::{Bsdf, Colour, RoughBoundary};
 use crate::tally::{Cause, Tally, WalkTally};
 
 /// A path that a surface with a mirror has left this weight goes on for certain.
@@ -177,7 +177,7 @@ impl<'a> CameraPath<'a> {
                     self.turn(None);
                 }
                 if entry.body.matched {
-                    return self.tinted(entry.body.tint.as_ref(), &at).then(|| self.inside(entry, &at, direction))?;
+                    return self.let_in(entry, &at, direction);
                 }
                 let flat = SurfacePoint { n: at.n_geometric, ..at };
                 if entry.body.rough.is_some() {
@@ -187,7 +187,7 @@ impl<'a> CameraPath<'a> {
                 if w.dot(at.n_geometric) > 0.0 {
                     return Some(Ray::new(at.leave(w), w));
                 }
-                self.tinted(entry.body.tint.as_ref(), &at).then(|| self.inside(entry, &at, w))?
+                self.let_in(entry, &at, w)
             }
         }
     }
@@ -255,20 +255,28 @@ impl<'a> CameraPath<'a> {
             }
             [false, false] => {
                 self.turn(None);
-                self.tinted(entry.body.tint.as_ref(), at).then(|| self.inside(entry, at, next.wi))?
+                self.let_in(entry, at, next.wi)
             }
             _ => None,
         }
     }
 
     /// Through the pigment on a boundary; whether anything is left.
-    pub fn tinted(&mut self, tint: Option<&Tint>, at: &SurfacePoint) -> bool {
+    pub fn tinted(&mut self, tint: Option<&Colour>, at: &SurfacePoint) -> bool {
         let Some(tint) = tint else { return true };
         self.spectrum.scale(tint.at(at));
         !self.spectrum.value_outside().is_black()
     }
 
-    /// Through bodies from `at`, refracted into `w`; the ray on which the path leaves them.
+    /// Through the pigment at `at` and, refracted into `w`, through bodies; the ray on which the path leaves them.
+    pub fn let_in(&mut self, entry: Entry<'a>, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
+        if !self.tinted(entry.body.tint.as_ref(), at) {
+            return None;
+        }
+        self.inside(entry, at, w)
+    }
+
+    /// Through bodies from `at`, refracted into `w`, the pigment behind; the ray on which the path leaves them.
     pub fn inside(&mut self, entry: Entry<'a>, at: &SurfacePoint, w: Vec3) -> Option<Ray> {
         let from = SurfacePoint { error: at.error.max(entry.margin), ..*at }.leave(w);
         self.through(entry, from, w)

@@ -10,7 +10,7 @@ use crate::math::{DVec3, Rgb, Vec3};
 use crate::optics::{HenyeyGreenstein, Medium};
 use crate::query::{Hit, Ray};
 use crate::scene::{Contacts, Surface};
-use crate::surface::{Boundary, Bsdf, BsdfSample, RoughBoundary, Tint};
+use crate::surface::{Boundary, Bsdf, BsdfSample, Colour, RoughBoundary};
 use crate::tally::{Cause, WalkTally};
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub struct Interior {
     /// Its boundary, if that is not smooth.
     pub rough: Option<Arc<RoughBoundary>>,
     /// Pigment on it. Whoever follows light in or out takes it into account: walks do not.
-    pub tint: Option<Tint>,
+    pub tint: Option<Colour>,
     /// The medium.
     pub medium: Coefficients,
     /// Where collisions send light.

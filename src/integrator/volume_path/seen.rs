@@ -44,11 +44,8 @@ pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, directi
     if body.rough.is_some() {
         return path.meet_rough(entry, (&at, -direction), false);
     }
-    if !path.tinted(body.tint.as_ref(), &at) {
-        return None;
-    }
     if body.matched {
-        return path.inside(entry, &at, direction);
+        return path.let_in(entry, &at, direction);
     }
     let n = shading_normal(body, &at, direction);
     let passed = transmittance(body.eta, -n.dot(direction));
@@ -56,7 +53,7 @@ pub fn enter<'a>(path: &mut CameraPath<'a>, entry: Entry<'a>, hit: &Hit, directi
         return None;
     }
     path.spectrum.scale(Rgb::splat(passed));
-    path.inside(entry, &at, refract(-direction, n, body.eta)?)
+    path.let_in(entry, &at, refract(-direction, n, body.eta)?)
 }
 
 /// The normal of both parts. As in `subsurface` what leaves towards the viewer is shaded with the interpolated one, but not
